@@ -173,12 +173,12 @@ class ObjectInfo:
 
     @property
     def bottom_z(self) -> float:
-        """m, height of the lowest point."""
+        """Height of the lowest point, m."""
         return float(self.centre[2] - self.extent[2] / 2)
 
     @property
     def top_z(self) -> float:
-        """m, height of the highest point."""
+        """Height of the highest point, m."""
         return float(self.centre[2] + self.extent[2] / 2)
 
     @property

@@ -1,0 +1,49 @@
+"""What a run tells the outside while it happens; recording and display subscribe here.
+
+Kinds of events and their data:
+
+| kind | data |
+|---|---|
+| run_started | instruction, task (or None), seed, agents (their name) |
+| observed | turn, observation |
+| described | turn, scene |
+| reasoned | turn, subtask |
+| located | turn, objects, detections |
+| planned | turn, sequence, keypoints |
+| move | turn, description, seconds (robot time the move will take) |
+| executed | turn, report |
+| failed | turn, stage, reason |
+| frame | rgb, robot_time: the main view while the arm moves, for the video |
+| run_finished | result, achieved (by the task's predicate; None where nobody knows) |
+"""
+
+from __future__ import annotations
+
+import time
+from collections.abc import Callable, Sequence
+from typing import Any, Protocol
+
+from ..types import Event
+
+
+class Observer(Protocol):
+    """Anything that wants to know what happens in a run."""
+
+    def on_event(self, event: Event) -> None:
+        """Take note of one event; must return quickly and must not change its data."""
+        ...
+
+
+class EventLog:
+    """Stamps events with the time since its creation and hands them to every observer."""
+
+    def __init__(self, observers: Sequence[Observer] = (), clock: Callable[[], float] = time.monotonic) -> None:
+        self._observers = tuple(observers)
+        self._clock = clock
+        self._start = clock()
+
+    def emit(self, kind: str, **data: Any) -> None:
+        """Tell every observer, in the order they were given."""
+        event = Event(kind, self._clock() - self._start, data)
+        for observer in self._observers:
+            observer.on_event(event)

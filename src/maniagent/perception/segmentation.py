@@ -1,0 +1,175 @@
+"""Splitting what stands on the table into objects, by geometry and colour.
+
+On the height map: steps in colour or height are edges; what lies between edges seeds a region; a watershed grows the
+regions to the edges. That splits too much (the stem of a pepper, the ring on a plate), so regions are merged again
+by the rules in `merging.py`.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Mapping
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..types import BoolArray, Observation
+from .heightmap import HeightMap, build_height_map
+from .merging import merge_regions
+from .segments import Segment
+from .views import RobotFilter, Tuning, ViewPoints, Workspace, foreground
+
+Labels = NDArray[np.int32]
+"""(X, Y), 0 where nothing stands, else the number of a region, from 1."""
+
+COLOUR_STEP = 20.0
+"""CIE Lab distance over EDGE_SPAN that makes an edge."""
+HEIGHT_STEP = 0.008
+"""m over EDGE_SPAN that makes an edge."""
+EDGE_SPAN = 2
+"""Cells to either side of the one that is judged."""
+MIN_SEED = 5
+"""Cells; smaller islands between edges seed nothing."""
+MIN_OBJECT_AREA = 0.8e-4
+"""m^2; anything smaller from above is noise."""
+MAX_POINTS = 6000
+"""Points kept of a segment: more make nothing better."""
+
+
+@dataclass(frozen=True)
+class TableView:
+    """Everything perception knows of one observation."""
+
+    segments: tuple[Segment, ...]
+    """Left to right, then far to near, as numbered in pictures."""
+    height_map: HeightMap
+
+
+def segment(
+    observation: Observation,
+    covers_robot: RobotFilter,
+    workspace: Workspace = Workspace(),  # noqa: B008 - frozen
+    tuning: Tuning = Tuning(),  # noqa: B008 - frozen
+) -> TableView:
+    """Split what the cameras see into segments, without naming them.
+
+    Raises
+    ------
+    CameraFailure
+        Where the main view is of no use.
+
+    """
+    views = foreground(observation, covers_robot, workspace, tuning)
+    grid = build_height_map(views, workspace)
+    labels = merge_regions(_split(grid), grid)
+    supports = _supports(labels, grid)
+    segments = _cut(views, labels, supports, grid)
+    order = np.argsort([s.centre[1] for s in segments], kind="stable")
+    return TableView(tuple(segments[i] for i in order), grid)
+
+
+def _split(grid: HeightMap) -> Labels:
+    """Seeds between the edges, grown by a watershed."""
+    lab = grid.lab()
+    edges = np.zeros(grid.occupied.shape, bool)
+    inside = slice(EDGE_SPAN, -EDGE_SPAN)
+    before, after = slice(None, -2 * EDGE_SPAN), slice(2 * EDGE_SPAN, None)
+    for low, high, middle in (
+        ((before, inside), (after, inside), (inside, inside)),
+        ((inside, before), (inside, after), (inside, inside)),
+        ((before, before), (after, after), (inside, inside)),
+        ((before, after), (after, before), (inside, inside)),
+    ):
+        both = grid.occupied[low] & grid.occupied[high]
+        colour = np.linalg.norm(lab[low] - lab[high], axis=-1) > COLOUR_STEP
+        step = np.abs(grid.height[low] - grid.height[high]) > HEIGHT_STEP
+        edges[middle] |= both & (colour | step)
+    seeds = (grid.occupied & ~edges).astype(np.uint8)
+    count, markers, stats, _ = cv2.connectedComponentsWithStats(seeds, connectivity=4)
+    small = stats[:, cv2.CC_STAT_AREA] < MIN_SEED
+    markers = np.where(small[markers], 0, markers)
+    markers = _seed_the_unseeded(markers, grid.occupied, count)
+    markers[~grid.occupied] = markers.max() + 1  # a region of its own for the table, so that nothing floods it
+    relief = np.clip(grid.height * (255.0 / 0.10), 0, 255)
+    image = np.dstack([relief, lab[..., 1], lab[..., 2]]).astype(np.uint8)
+    table = int(markers.max())
+    grown = cv2.watershed(image, markers.astype(np.int32))
+    return _fill_ridges(np.where((grown == table) | ~grid.occupied, 0, grown), grid.occupied)
+
+
+def _seed_the_unseeded(markers: Labels, occupied: BoolArray, first: int) -> Labels:
+    """Seed whole islands that consist of nothing but edges (a thin fork, a steep egg)."""
+    count, islands = cv2.connectedComponents(occupied.astype(np.uint8), connectivity=8)
+    seeded = np.zeros(count, bool)
+    seeded[np.unique(islands[markers > 0])] = True
+    seeded[0] = True
+    out = markers.astype(np.int32)
+    unseeded = ~seeded[islands]
+    out[unseeded] = first + islands[unseeded]
+    return out
+
+
+def _fill_ridges(labels: Labels, occupied: BoolArray) -> Labels:
+    """Give the watershed's ridge cells (-1) to a neighbour."""
+    out = np.maximum(labels, 0).astype(np.int32)
+    for _ in range(3):
+        missing = occupied & (out == 0)
+        if not missing.any():
+            break
+        spread = cv2.dilate(out.astype(np.float32), np.ones((3, 3), np.uint8)).astype(np.int32)
+        out[missing] = spread[missing]
+    return out
+
+
+def _supports(labels: Labels, grid: HeightMap) -> Mapping[int, tuple[float, int]]:
+    """By region: the height (m) it rests on, and which region that is (0: the table).
+
+    A region rests on another where most of its border is with that one, and higher than it.
+    """
+    supports: dict[int, tuple[float, int]] = {}
+    kernel = np.ones((7, 7), np.uint8)
+    for label in np.unique(labels[labels > 0]):
+        mask = labels == label
+        ring = (cv2.dilate(mask.astype(np.uint8), kernel) > 0) & ~mask
+        neighbours, counts = np.unique(labels[ring], return_counts=True)
+        below, share = int(neighbours[counts.argmax()]), counts.max() / counts.sum()
+        supports[int(label)] = (0.0, 0)
+        if below > 0 and share > 0.6:
+            level = float(np.median(grid.height[ring & (labels == below)]))
+            if np.percentile(grid.height[mask], 90) > level + 0.004:
+                supports[int(label)] = (level, below)
+    return supports
+
+
+def _cut(
+    views: tuple[ViewPoints, ...], labels: Labels, supports: Mapping[int, tuple[float, int]], grid: HeightMap
+) -> list[Segment]:
+    """The points of every region, from all views, and its mask in each."""
+    pixel_labels = []
+    for view in views:
+        rows, columns = grid.cells(view.points).T
+        of_pixel = labels[rows, columns]
+        # What is seen below a region that rests on another is the other's flank.
+        for label, (level, below) in supports.items():
+            if below:
+                of_pixel[(of_pixel == label) & (view.points[:, 2] < level - 0.002)] = below
+        pixel_labels.append(of_pixel)
+    all_points = np.concatenate([view.points for view in views])
+    all_colours = np.concatenate([view.colours for view in views])
+    all_labels = np.concatenate(pixel_labels)
+    segments = []
+    for label, (level, _) in supports.items():
+        if np.count_nonzero(labels == label) * grid.cell**2 < MIN_OBJECT_AREA:
+            continue
+        chosen = np.flatnonzero(all_labels == label)
+        if len(chosen) < 20:
+            continue
+        chosen = chosen[:: max(1, len(chosen) // MAX_POINTS)]
+        masks = {}
+        for view, of_pixel in zip(views, pixel_labels, strict=True):
+            mask = np.zeros(view.shape, bool)
+            mask.ravel()[view.pixels[of_pixel == label]] = True
+            masks[view.name] = mask
+        segments.append(Segment(all_points[chosen], all_colours[chosen], level, masks))
+    return segments

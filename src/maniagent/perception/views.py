@@ -1,0 +1,140 @@
+"""From calibrated RGB-D images to points in the base frame that belong to things on the table."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from dataclasses import dataclass
+
+import cv2
+import numpy as np
+from numpy.typing import NDArray
+
+from ..errors import CameraFailure
+from ..geometry import backproject, transform_points
+from ..types import BoolArray, CameraFrame, Observation, RobotState
+
+RobotFilter = Callable[[NDArray[np.float32], RobotState], BoolArray]
+"""Which of these points (N, 3), base frame, lie on the robot itself: (N,) bool."""
+
+
+@dataclass(frozen=True)
+class Workspace:
+    """The part of the table that is looked at, base frame, m."""
+
+    x: tuple[float, float] = (0.06, 0.56)
+    y: tuple[float, float] = (-0.40, 0.40)
+    z: tuple[float, float] = (-0.03, 0.30)
+
+
+@dataclass(frozen=True)
+class Tuning:
+    """Thresholds of the foreground, stated for a D435-class camera about 0.8 m away."""
+
+    height: float = 0.008
+    """m above the table plane from which a point belongs to a thing, whatever its colour."""
+    colour: float = 16.0
+    """CIE Lab distance from the table's colour from which a point belongs to a thing, however flat."""
+    lightness_weight: float = 0.25
+    """How much lightness counts in that distance: shadows are dark, too."""
+    plane_band: float = 0.015
+    """m around z = 0 in which the table plane is sought: the calibration may be off by that much."""
+    min_seen: float = 0.25
+    """Share of the workspace's pixels that must have depth for a view to be of use."""
+
+
+@dataclass(frozen=True)
+class ViewPoints:
+    """The foreground of one view."""
+
+    name: str
+    shape: tuple[int, int]
+    pixels: NDArray[np.intp]
+    """(N,) flat pixel indices."""
+    points: NDArray[np.float32]
+    """(N, 3) m, base frame, z above the table plane."""
+    colours: NDArray[np.uint8]
+    """(N, 3) RGB."""
+
+
+def foreground(
+    observation: Observation, covers_robot: RobotFilter, workspace: Workspace, tuning: Tuning
+) -> tuple[ViewPoints, ...]:
+    """What stands on the table, view by view.
+
+    A view without depth on enough of the table is left out; the main view may not be.
+
+    Raises
+    ------
+    CameraFailure
+        Where the main view is blocked, has no depth, or shows no table.
+
+    """
+    views = []
+    for name, frame in observation.frames.items():
+        try:
+            views.append(_view_foreground(frame, observation.robot, covers_robot, workspace, tuning))
+        except CameraFailure:
+            if name == observation.main:
+                raise
+    return tuple(views)
+
+
+def _view_foreground(
+    frame: CameraFrame, robot: RobotState, covers_robot: RobotFilter, workspace: Workspace, tuning: Tuning
+) -> ViewPoints:
+    # The median takes out most of the depth noise and keeps edges; it can't handle NaN, zero stands for it.
+    known = np.isfinite(frame.depth) & (frame.depth > 0)
+    depth = cv2.medianBlur(np.where(known, frame.depth, np.float32(0)), 5)
+    known &= depth > 0
+    points = transform_points(frame.T_base_camera.astype(np.float32), backproject(frame.K, depth))
+    inside = known.copy()
+    for axis, (low, high) in enumerate((workspace.x, workspace.y, workspace.z)):
+        inside &= (points[..., axis] > low) & (points[..., axis] < high)
+    _check_view(frame, inside, workspace, tuning)
+    plane = _fit_table(frame.name, points[inside][::7], tuning)
+    height = points[..., 2] - (plane[0] * points[..., 0] + plane[1] * points[..., 1] + plane[2])
+    lab = cv2.cvtColor(cv2.GaussianBlur(frame.rgb, (3, 3), 0), cv2.COLOR_RGB2LAB).astype(np.float32)
+    on_plane = inside & (np.abs(height) < 0.004)
+    if not on_plane.any():
+        raise CameraFailure(f"The {frame.name} camera sees no table.")
+    difference = lab - np.median(lab[on_plane][::7], axis=0)
+    difference[..., 0] *= tuning.lightness_weight
+    coloured = np.einsum("hwc,hwc->hw", difference, difference) > tuning.colour**2
+    candidates = np.flatnonzero(inside & ((height > tuning.height) | (coloured & (height > -tuning.height))))
+    candidate_points = points.reshape(-1, 3)[candidates]
+    candidate_points[:, 2] = height.ravel()[candidates]
+    keep = ~covers_robot(candidate_points, robot)
+    chosen = candidates[keep]
+    return ViewPoints(
+        frame.name, frame.depth.shape, chosen, candidate_points[keep], frame.rgb.reshape(-1, 3)[chosen]
+    )  # fmt: skip
+
+
+def _check_view(frame: CameraFrame, inside: BoolArray, workspace: Workspace, tuning: Tuning) -> None:
+    """Raise CameraFailure unless enough of the part of the image that shows the workspace has depth."""
+    corners = np.array([[x, y, 0.0] for x in workspace.x for y in workspace.y])
+    in_camera = transform_points(frame.T_camera_base, corners)
+    if (in_camera[:, 2] <= 0.05).any():
+        raise CameraFailure(f"The {frame.name} camera's calibration puts the table behind it.")
+    uv = in_camera[:, :2] / in_camera[:, 2:] * [frame.K[0, 0], frame.K[1, 1]] + frame.K[:2, 2]
+    outline = cv2.convexHull(uv.astype(np.float32)).astype(np.int32)
+    expected = np.zeros(frame.depth.shape, np.uint8)
+    cv2.fillConvexPoly(expected, outline, 1)
+    total = int(expected.sum())
+    seen = float((inside & (expected > 0)).sum()) / max(total, 1)
+    if seen < tuning.min_seen:
+        raise CameraFailure(
+            f"The {frame.name} camera has depth on only {seen:.0%} of the table: it is blocked, off, or has moved."
+        )
+
+
+def _fit_table(name: str, points: NDArray[np.float32], tuning: Tuning) -> NDArray[np.float64]:
+    """Coefficients (a, b, c) of the table plane z = a x + b y + c, by least squares with shrinking tolerance."""
+    plane = np.zeros(3)
+    A = np.column_stack([points[:, :2], np.ones(len(points))]).astype(np.float64)
+    for tolerance in (tuning.plane_band, tuning.plane_band / 2, 0.005):
+        near = np.abs(points[:, 2] - A @ plane) < tolerance
+        if near.sum() < 200:
+            raise CameraFailure(f"The {name} camera sees no table at the height the calibration says.")
+        plane, *_ = np.linalg.lstsq(A[near], points[near, 2].astype(np.float64), rcond=None)
+    return plane
