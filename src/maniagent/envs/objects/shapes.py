@@ -1,0 +1,80 @@
+"""Curves, profiles and collision chains that several objects share. Lengths are metres."""
+
+from __future__ import annotations
+
+from collections.abc import Callable
+from itertools import pairwise
+
+import numpy as np
+from numpy.typing import ArrayLike
+
+from ...geometry import FloatArray
+from .mesh import Mesh, sweep
+from .pieces import Piece, capsule_piece
+
+FLAT = 0.0005
+"""m, how deep the underside of round things is flattened, so that they lie still."""
+
+
+def bow(length: float, sagitta: float, count: int = 24) -> FloatArray:
+    """Points (count, 2) of a parabola along x whose middle lies `sagitta` to the left (+y) of its ends."""
+    x = np.linspace(-length / 2, length / 2, count)
+    return np.column_stack([x, sagitta * (1.0 - (2.0 * x / length) ** 2)])
+
+
+def stations(count: int) -> FloatArray:
+    """(count,) places from 0 to 1, denser at both ends, where bodies round off."""
+    return 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
+
+
+def profile(at: ArrayLike, radii: ArrayLike, count: int = 24) -> tuple[FloatArray, FloatArray]:
+    """Places (count,) in [0, 1] and radii there, through the given ones; both ends round off to almost nothing."""
+    t = stations(count)
+    radius = np.interp(t, np.asarray(at, float), np.asarray(radii, float))
+    kernel = np.array([0.25, 0.5, 0.25])
+    smooth = np.convolve(np.pad(radius, 1, mode="edge"), kernel, mode="valid")
+    smooth[[0, -1]] = 1e-4
+    return t, smooth
+
+
+def resting(xy: FloatArray, radius: FloatArray, *, sides: int = 20, flatness: float = 1.0) -> Mesh:
+    """A round body lying on z = 0 along `xy` (R, 2), with `radius` (R,) there; its underside slightly flat.
+
+    `flatness` scales the height against the width.
+    """
+    height = radius * flatness
+    centre = np.column_stack([xy, np.full(len(xy), 0.0)])
+    centre[:, 2] = height.max() - FLAT
+    return sweep(centre, np.column_stack([radius, height]), sides=sides).cut_below(0.0)
+
+
+def lying(xy: FloatArray, radius: FloatArray, *, sides: int = 20) -> Mesh:
+    """As `resting`, but the whole underside touches z = 0: the axis sinks where the body thins."""
+    return sweep(np.column_stack([xy, radius - FLAT]), radius, sides=sides).cut_below(0.0)
+
+
+def capsules_along(
+    xy: FloatArray, radius: FloatArray, count: int, height: Callable[[float], float] | None = None
+) -> list[Piece]:
+    """`count` level capsules that fill a round body along `xy` (R, 2) with `radius` (R,).
+
+    `height` gives a capsule's axis height from its radius; without it each capsule lies on z = 0.
+    """
+    steps = np.linalg.norm(np.diff(xy, axis=0), axis=1)
+    s = np.concatenate([[0.0], np.cumsum(steps)])
+
+    def point(at: float) -> FloatArray:
+        return np.array([np.interp(at, s, xy[:, 0]), np.interp(at, s, xy[:, 1])])
+
+    edges = np.linspace(0.0, s[-1], count + 1)
+    pieces = []
+    for index, (low, high) in enumerate(pairwise(edges)):
+        r = float(np.interp((low + high) / 2, s, radius)) - FLAT / 2
+        start = low + (r if index == 0 else 0.0)
+        end = high - (r if index == count - 1 else 0.0)
+        if end - start < 1e-3:  # a stub shorter than it is thick: all but a sphere
+            middle = (start + end) / 2
+            start, end = middle - 5e-4, middle + 5e-4
+        z = r if height is None else height(r)
+        pieces.append(capsule_piece([*point(start), z], [*point(end), z], r))
+    return pieces
