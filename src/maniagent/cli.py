@@ -1,0 +1,201 @@
+"""The command line: parses, calls, prints. What it calls is imported where it is used, so that help is instant."""
+
+from __future__ import annotations
+
+from collections.abc import Iterator
+from contextlib import contextmanager
+from dataclasses import asdict
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from . import __version__
+from .errors import ManiAgentError, UsageError
+
+if TYPE_CHECKING:
+    from .app import RunOutcome
+
+ACHIEVED, NOT_ACHIEVED, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
+"""Exit statuses."""
+
+app = typer.Typer(
+    name="maniagent",
+    add_completion=False,
+    no_args_is_help=True,
+    pretty_exceptions_enable=False,
+    rich_markup_mode="rich",
+    context_settings={"help_option_names": ["-h", "--help"]},
+    epilog="Start with [bold]maniagent doctor[/], then [bold]maniagent run --task carrot-on-plate[/].",
+)
+
+Json = Annotated[bool, typer.Option("--json", help="Print one JSON value on stdout and nothing else.")]
+
+
+def main() -> None:
+    """Entry point of the `maniagent` command."""
+    app()
+
+
+def _print_version(wanted: bool) -> None:
+    if wanted:
+        typer.echo(f"maniagent {__version__}")
+        raise typer.Exit(ACHIEVED)
+
+
+@app.callback()
+def root(
+    version: Annotated[
+        bool, typer.Option("--version", help="Print the version.", is_eager=True, callback=_print_version)
+    ] = False,
+) -> None:
+    """Type an instruction; agents look at the table through RGB-D cameras and move the robot arm until it is done."""
+
+
+@app.command()
+def run(
+    instruction: Annotated[
+        str | None, typer.Argument(help="What to do, in plain English. Without it: the task's own instruction.")
+    ] = None,
+    task: Annotated[str | None, typer.Option(help="Name of a task; `maniagent tasks` lists them.")] = None,
+    scene: Annotated[Path | None, typer.Option(help="Your own scene, a YAML file (docs/scenes.md).")] = None,
+    seed: Annotated[int, typer.Option(min=0, help="Fixes where things lie, camera noise, and all else drawn.")] = 0,
+    out: Annotated[
+        Path | None,
+        typer.Option(help="Run folder; an earlier run in it is replaced.", show_default="runs/TIME-TASK-sSEED"),
+    ] = None,
+    view: Annotated[bool, typer.Option("--view", help="Open a window and watch; needs a screen.")] = False,
+    as_json: Json = False,
+) -> None:
+    """Carry out one instruction in simulation, from camera images alone.
+
+    [bold]Examples[/]
+
+      maniagent run --task carrot-on-plate
+
+      maniagent run "move the carrot next to the plate" --task carrot-on-plate
+
+      maniagent run "put the spoon on the towel" --scene kitchen.yaml --seed 7
+
+      maniagent run --task green-on-yellow --json | jq .achieved
+
+    Exit status: 0 achieved, 1 not achieved, 2 wrong use or missing set-up, 130 stopped with Ctrl-C.
+    """
+    with _errors_told(as_json):
+        if (task is None) == (scene is None):
+            raise UsageError("Name either --task NAME (`maniagent tasks` lists them) or --scene FILE.yaml.")
+        from .app import run as run_app
+        from .console.folder import default_folder
+        from .console.progress import Progress
+
+        folder = out or default_folder(task or (scene.stem if scene else None), seed)
+        with Progress() as progress:
+            outcome = run_app(
+                instruction, task=task, scene=scene, seed=seed, out=folder, view=view, observers=(progress,)
+            )
+        _tell_outcome(outcome, as_json)
+        raise typer.Exit(_status(outcome))
+
+
+@app.command()
+def tasks(as_json: Json = False) -> None:
+    """List the tasks: name, suite, what is said to the robot, and whether a language model is needed for it."""
+    with _errors_told(as_json):
+        from .console.output import print_json, print_table
+        from .tasks import get, names
+
+        listed = [get(name) for name in names()]
+        if as_json:
+            fields = ("name", "title", "instruction", "suite", "needs_model")
+            print_json([{field: getattr(task, field) for field in fields} for task in listed])
+            return
+        rows = [(task.name, task.suite, task.instruction, "yes" if task.needs_model else "no") for task in listed]
+        print_table(("task", "suite", "instruction", "needs a model"), rows)
+
+
+@app.command()
+def gallery(
+    out: Annotated[Path, typer.Option(help="The PNG file to write.")] = Path("gallery.png"), as_json: Json = False
+) -> None:
+    """Draw every object of the library into one picture."""
+    with _errors_told(as_json):
+        from .envs.gallery import render_gallery
+
+        _tell_path(render_gallery(out), as_json)
+
+
+@app.command()
+def report(folder: Annotated[Path, typer.Argument(help="A run folder.")], as_json: Json = False) -> None:
+    """Write a run folder's report.html anew, also for a run that was cut short."""
+    with _errors_told(as_json):
+        from .console.report import write_report
+
+        _tell_path(write_report(folder), as_json)
+
+
+@app.command()
+def doctor(as_json: Json = False) -> None:
+    """Say what is installed, what renders, what is missing, and the line that fixes it.
+
+    Exit status: 0 where `maniagent run` works here, else 2.
+    """
+    with _errors_told(as_json):
+        from .console.output import print_checks, print_json
+        from .doctor import examine, works
+
+        checks = examine()
+        if as_json:
+            print_json({"works": works(checks), "checks": [asdict(check) for check in checks]})
+        else:
+            print_checks(checks)
+        raise typer.Exit(ACHIEVED if works(checks) else WRONG_USE)
+
+
+@contextmanager
+def _errors_told(as_json: bool) -> Iterator[None]:
+    """Turn what ends a command early into one line, one JSON object where that was asked for, and an exit status."""
+    from .console.output import print_error, print_json
+
+    try:
+        yield
+    except ManiAgentError as error:
+        message, status = str(error), WRONG_USE
+    except KeyboardInterrupt:
+        message, status = "Stopped with Ctrl-C.", INTERRUPTED
+    else:
+        return
+    print_error(message)
+    if as_json:
+        print_json({"error": message})
+    raise typer.Exit(status)
+
+
+def _tell_outcome(outcome: RunOutcome, as_json: bool) -> None:
+    from .console.folder import REPORT
+    from .console.output import print_json, print_verdict
+    from .console.summary import summarise
+
+    if as_json:
+        known = {"task": outcome.task, "seed": outcome.seed, "achieved": outcome.achieved, "out": outcome.out}
+        print_json(summarise(outcome.result, **known))
+    else:
+        print_verdict(outcome.result, outcome.achieved, outcome.out and outcome.out / REPORT)
+
+
+def _tell_path(path: Path, as_json: bool) -> None:
+    from .console.output import print_json
+
+    if as_json:
+        print_json({"out": str(path)})
+    else:
+        typer.echo(path)
+
+
+def _status(outcome: RunOutcome) -> int:
+    """What is true decides; where nobody knows, what the agents believe."""
+    believed = outcome.result.verdict == "achieved"
+    return ACHIEVED if (believed if outcome.achieved is None else outcome.achieved) else NOT_ACHIEVED
+
+
+if __name__ == "__main__":
+    main()
