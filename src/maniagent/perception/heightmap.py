@@ -55,7 +55,7 @@ class HeightMap:
 
 
 def build_height_map(views: Sequence[ViewPoints], workspace: Workspace, cell: float = 0.002) -> HeightMap:
-    """Fuse the foreground of all views; gaps of a cell or two are closed from their neighbours."""
+    """Fuse the foreground of all views; gaps of a few cells are closed from their neighbours."""
     origin = (workspace.x[0], workspace.y[0])
     shape = (
         round((workspace.x[1] - workspace.x[0]) / cell),
@@ -80,13 +80,14 @@ def build_height_map(views: Sequence[ViewPoints], workspace: Workspace, cell: fl
 
 
 def _close_gaps(grid: HeightMap) -> HeightMap:
-    closed = cv2.morphologyEx(grid.occupied.astype(np.uint8), cv2.MORPH_CLOSE, np.ones((3, 3), np.uint8)) > 0
+    window = (5, 5)
+    closed = cv2.morphologyEx(grid.occupied.astype(np.uint8), cv2.MORPH_CLOSE, np.ones(window, np.uint8)) > 0
     gaps = closed & ~grid.occupied
-    weight = cv2.blur(grid.occupied.astype(np.float32), (3, 3))
+    weight = cv2.blur(grid.occupied.astype(np.float32), window)
     scale = 1.0 / np.maximum(weight, 1e-6)
     height, rgb = grid.height.copy(), grid.rgb.copy()
-    height[gaps] = (cv2.blur(grid.height, (3, 3)) * scale)[gaps]
-    rgb[gaps] = np.clip(cv2.blur(grid.rgb.astype(np.float32), (3, 3)) * scale[..., None], 0, 255)[gaps]
+    height[gaps] = (cv2.blur(grid.height, window) * scale)[gaps]
+    rgb[gaps] = np.clip(cv2.blur(grid.rgb.astype(np.float32), window) * scale[..., None], 0, 255)[gaps]
     # One pixel's noise mustn't make a peak of the topmost surface.
     smooth = np.where(closed, cv2.medianBlur(height, 3), np.float32(0))
     return HeightMap(grid.origin, grid.cell, smooth, rgb, closed)

@@ -1,25 +1,29 @@
 """Which regions of the height map belong to one object after all.
 
-Each rule is a fact about things on tables: a print has no height, a rim surrounds its well, a stem is small, a cap
-continues its pen. Objects that touch side by side, or lie on one another, meet none of them.
+Each rule is a fact about things on tables: a print has no height, what would hold water is one vessel, a stem is
+small, a cap continues its pen. Objects that touch side by side, or lie on one another, meet none of them.
 """
 
 from __future__ import annotations
 
 from collections.abc import Callable, Iterator
 from dataclasses import dataclass
+from itertools import pairwise
 
 import cv2
 import numpy as np
 from numpy.typing import NDArray
 
 from ..geometry import FloatArray
+from ..types import BoolArray
 from .heightmap import HeightMap
 
 Labels = NDArray[np.int32]
 
 SAME_COLOUR = 16.0
 """CIE Lab distance (lightness scaled down) below which two surfaces have one colour."""
+SAME_HUE = 13.0
+"""Distance in the a, b plane below which two surfaces have one colour, however lit."""
 LEVEL = 0.004
 """m; a smaller step between two surfaces is none."""
 FLAT = 0.010
@@ -30,9 +34,13 @@ ELONGATED = 2.4
 """Length over width from which end-to-end parts may make one tool, fruit or pen."""
 STEP_SPAN = 2
 """Cells to either side of a border between which its step is measured."""
+WATER_LEVELS = (0.008, 0.012, 0.016, 0.024, 0.036, 0.050)
+"""m, heights up to which the table is flooded in thought to find vessels."""
+MIN_BASIN = 5e-4
+"""m^2; smaller hollows are dents."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Region:
     cells: NDArray[np.intp]
     """(N, 2) rows and columns."""
@@ -42,13 +50,11 @@ class _Region:
     """(3,) median Lab."""
     top: float
     """m, 90th percentile of its height."""
-    perimeter: int
-    """Cells it has in common with anything else, the table included."""
-    outer: int
-    """Of those, with the table."""
+    basin: int
+    """Number of the basin it is part of, as its bottom or its wall; 0 for none."""
 
 
-@dataclass(frozen=True)
+@dataclass(frozen=True, eq=False)
 class _Border:
     """Two neighbouring regions, the smaller one first."""
 
@@ -57,18 +63,34 @@ class _Border:
     length: int
     """Cells."""
     step: float
-    """m, median height of the large one minus that of the small one, next to the border."""
+    """m, mean height of the large one minus that of the small one, next to the border."""
+    perimeter: int
+    """Cells the small one has in common with anything else, the table included."""
+    outer: int
+    """Of those, with the table."""
     cell: float
     """m"""
 
     @property
     def share(self) -> float:
         """Share of the small region's perimeter."""
-        return self.length / max(self.small.perimeter, 1)
+        return self.length / max(self.perimeter, 1)
 
     @property
     def same_colour(self) -> bool:
         return float(np.linalg.norm(self.small.colour - self.large.colour)) < SAME_COLOUR
+
+    @property
+    def same_hue(self) -> bool:
+        """One colour but for the light: in shade, chroma fades along with lightness."""
+        dark, bright = sorted((self.small.colour, self.large.colour), key=lambda lab: float(lab[0]))
+        faded = (bright[1:] - 128.0) * dark[0] / max(float(bright[0]), 1.0)
+        return float(np.linalg.norm(dark[1:] - 128.0 - faded)) < SAME_HUE
+
+    @property
+    def colourful(self) -> bool:
+        """Both have a hue at all: among greys, lightness is all there is to tell things apart."""
+        return all(np.linalg.norm(part.colour[1:] - 128.0) > SAME_HUE for part in (self.small, self.large))
 
     @property
     def is_level(self) -> bool:
@@ -79,25 +101,35 @@ def _one_surface(border: _Border) -> bool:
     return border.same_colour and border.is_level
 
 
+def _shaded_side(border: _Border) -> bool:
+    """The side of a round thing that lies in shade."""
+    return border.same_hue and border.colourful and abs(border.step) < 0.012 and border.share > 0.25
+
+
+def _limb(border: _Border) -> bool:
+    """Head and body: of one colour, side by side, whatever their heights. What stands ON a thing has no outer side."""
+    one_colour = border.same_colour or (border.same_hue and border.colourful)
+    return one_colour and border.share > 0.2 and border.outer > 0.25 * border.perimeter
+
+
+def _vessel(border: _Border) -> bool:
+    """Bottom and walls of what would hold water."""
+    return border.small.basin > 0 and border.small.basin == border.large.basin and border.same_hue
+
+
 def _print(border: _Border) -> bool:
     """A pattern within a surface: no step, and (almost) no border with the table."""
-    return border.is_level and border.share > 0.35 and border.small.outer < 0.1 * border.small.perimeter
+    return border.is_level and border.share > 0.35 and border.outer < 0.1 * border.perimeter
 
 
 def _cloth(border: _Border) -> bool:
     return border.is_level and max(border.small.top, border.large.top) < FLAT
 
 
-def _rim(border: _Border) -> bool:
-    """One colour, and the higher one surrounds the lower one for the most part."""
-    low, step = (border.small, border.step) if border.step > 0 else (border.large, -border.step)
-    return step > 0 and border.same_colour and border.length > 0.45 * low.perimeter
-
-
 def _attachment(border: _Border) -> bool:
     """A stem, a beak, a leaf: tiny, or small and level with what it grows from."""
     if border.small.area < TINY:
-        return border.share > 0.15
+        return border.share > 0.05
     return border.small.area < 0.35 * border.large.area and abs(border.step) < 0.006 and border.share > 0.25
 
 
@@ -106,48 +138,146 @@ def _end_to_end(border: _Border) -> bool:
     length, width, fill = _rectangle(np.concatenate([border.small.cells, border.large.cells]), border.cell)
     if length < ELONGATED * width or fill < 0.6 or abs(border.step) > 0.012:
         return False
-    if border.length * border.cell > 1.8 * width:
+    if border.length * border.cell > 3.0 * width:
         return False
     return all(_rectangle(part.cells, border.cell)[1] < 1.15 * width for part in (border.small, border.large))
 
 
-_RULES: tuple[Callable[[_Border], bool], ...] = (_one_surface, _cloth, _print, _rim, _attachment, _end_to_end)
+_RULES: tuple[Callable[[_Border], bool], ...] = (
+    _one_surface,
+    _shaded_side,
+    _vessel,
+    _limb,
+    _cloth,
+    _print,
+    _attachment,
+    _end_to_end,
+)
 """Tried in this order: the surest first."""
 
 
 def merge_regions(labels: Labels, grid: HeightMap) -> Labels:
     """Merge neighbouring regions until no rule applies; the new labels."""
-    lab = grid.lab()
-    labels = labels.copy()
-    for _ in range(len(np.unique(labels))):
-        borders = list(_borders(labels, grid, lab))
-        pair = next((pair for rule in _RULES for pair, border in borders if rule(border)), None)
-        if pair is None:
-            break
-        labels[labels == pair[1]] = pair[0]
-    return labels
+    graph = _Graph(labels, grid)
+    while pair := next((pair for rule in _RULES for pair, border in graph.borders() if rule(border)), None):
+        graph.merge(*pair)
+    return graph.labels
 
 
-def _borders(labels: Labels, grid: HeightMap, lab: NDArray[np.float32]) -> Iterator[tuple[tuple[int, int], _Border]]:
-    """Every pair of neighbouring regions with their border, longest first."""
-    first, second, step = _contacts(labels, grid.height)
-    base = int(labels.max()) + 1
-    low, high = np.minimum(first, second), np.maximum(first, second)
-    step = np.where(first < second, step, -step)  # height of `high` minus height of `low`
-    keys, inverse, counts = np.unique(low * base + high, return_inverse=True, return_counts=True)
-    regions = _regions(labels, grid, lab, keys, counts, base)
-    for i in np.argsort(-counts, kind="stable"):
-        a, b = divmod(int(keys[i]), base)
-        if a == 0:
-            continue
-        rise = float(np.median(step[inverse == i]))
-        small, large = regions[a], regions[b]
-        if small.area > large.area:
-            small, large, rise = large, small, -rise
-        yield (a, b), _Border(small, large, int(counts[i]), rise, grid.cell)
+class _Graph:
+    """The regions and who borders on whom, kept up to date while regions are merged."""
+
+    def __init__(self, labels: Labels, grid: HeightMap) -> None:
+        self.labels = labels.copy()
+        self._grid = grid
+        self._lab = grid.lab()
+        self._basins, self._levels = _basins(grid)
+        self._first, self._second, self._step = _contacts(labels, grid.height)
+        order = np.argsort(labels, axis=None, kind="stable")
+        bounds = np.searchsorted(labels.ravel()[order], np.arange(labels.max() + 2))
+        cells = np.column_stack(np.unravel_index(order, labels.shape))
+        self._regions = {
+            label: self._measure(cells[low:high], label)
+            for label, (low, high) in enumerate(pairwise(bounds))
+            if label > 0 and high > low
+        }
+        self._borders: list[tuple[tuple[int, int], _Border]] | None = None
+
+    def merge(self, keep: int, drop: int) -> None:
+        """Make one region of two neighbours."""
+        cells = np.concatenate([self._regions[keep].cells, self._regions.pop(drop).cells])
+        self.labels[cells[:, 0], cells[:, 1]] = keep
+        self._first[self._first == drop] = keep
+        self._second[self._second == drop] = keep
+        border = self._first != self._second
+        self._first, self._second, self._step = self._first[border], self._second[border], self._step[border]
+        self._regions[keep] = self._measure(cells, keep)
+        self._borders = None
+
+    def borders(self) -> list[tuple[tuple[int, int], _Border]]:
+        """Every pair of neighbouring regions with their border, longest first."""
+        if self._borders is None:
+            self._borders = list(self._find_borders())
+        return self._borders
+
+    def _find_borders(self) -> Iterator[tuple[tuple[int, int], _Border]]:
+        base = int(self.labels.max()) + 1
+        low, high = np.minimum(self._first, self._second), np.maximum(self._first, self._second)
+        step = np.where(self._first < self._second, self._step, -self._step)  # from `low` to `high`
+        keys, inverse, counts = np.unique(low * base + high, return_inverse=True, return_counts=True)
+        rises = np.bincount(inverse, weights=step) / counts
+        perimeter = np.bincount(low, minlength=base) + np.bincount(high, minlength=base)
+        outer = np.bincount(high[low == 0], minlength=base)
+        for i in np.argsort(-counts, kind="stable"):
+            a, b = divmod(int(keys[i]), base)
+            if a == 0:
+                continue
+            rise = float(rises[i])
+            small, large = (a, b) if self._regions[a].area <= self._regions[b].area else (b, a)
+            yield (
+                (a, b),
+                _Border(
+                    small=self._regions[small],
+                    large=self._regions[large],
+                    length=int(counts[i]),
+                    step=rise if small == a else -rise,
+                    perimeter=int(perimeter[small]),
+                    outer=int(outer[small]),
+                    cell=self._grid.cell,
+                ),
+            )
+
+    def _measure(self, cells: NDArray[np.intp], label: int) -> _Region:
+        rows, columns = cells.T
+        height = self._grid.height[rows, columns]
+        return _Region(
+            cells=cells,
+            area=len(cells) * self._grid.cell**2,
+            colour=np.median(self._lab[rows, columns], axis=0),
+            top=float(np.percentile(height, 90)),
+            basin=self._basin_of(rows, columns, float(np.median(height)), label),
+        )
+
+    def _basin_of(self, rows: NDArray[np.intp], columns: NDArray[np.intp], height: float, label: int) -> int:
+        """The basin a region is bottom or wall of: mostly under water, or between the water and the table."""
+        touched = self._basins[rows, columns]
+        if not touched.any():
+            return 0
+        basin = int(np.bincount(touched[touched > 0]).argmax())
+        if height < self._levels[basin] and np.mean(touched == basin) > 0.8:
+            return basin
+        mine = (self._first == label) | (self._second == label)
+        outer = mine & ((self._first == 0) | (self._second == 0))
+        is_wall = outer.sum() > 0.1 * mine.sum() and abs(height - self._levels[basin]) < 0.02
+        return basin if is_wall else 0
 
 
-def _contacts(labels: Labels, height: NDArray[np.float32]) -> tuple[NDArray[np.int64], ...]:
+def _basins(grid: HeightMap) -> tuple[Labels, FloatArray]:
+    """Hollows that would hold water: their numbers from 1 (X, Y), grown by a wall's width, and their water levels."""
+    kernel = np.ones((3, 3), np.uint8)
+    level_of = np.zeros(grid.height.shape, np.float32)
+    for level in WATER_LEVELS:
+        wall = cv2.morphologyEx((grid.height > level).astype(np.uint8), cv2.MORPH_CLOSE, kernel)
+        level_of[_holes(wall) & grid.occupied] = level
+    count, basins, stats, _ = cv2.connectedComponentsWithStats((level_of > 0).astype(np.uint8), connectivity=4)
+    levels = np.zeros(count)
+    for basin in range(1, count):
+        if stats[basin, cv2.CC_STAT_AREA] * grid.cell**2 < MIN_BASIN:
+            basins[basins == basin] = 0
+        else:
+            levels[basin] = np.percentile(level_of[basins == basin], 90)
+    grown = cv2.dilate(basins.astype(np.float32), np.ones((13, 13), np.uint8)).astype(np.int32)
+    return np.where(basins > 0, basins, grown), levels
+
+
+def _holes(wall: NDArray[np.uint8]) -> BoolArray:
+    """What a wall surrounds: everything that can't be reached from the border of the map."""
+    padded = cv2.copyMakeBorder(wall, 1, 1, 1, 1, cv2.BORDER_CONSTANT, value=0)
+    cv2.floodFill(padded, None, (0, 0), 2)
+    return padded[1:-1, 1:-1] == 0
+
+
+def _contacts(labels: Labels, height: NDArray[np.float32]) -> tuple[NDArray[np.int64], NDArray[np.int64], FloatArray]:
     """All pairs of neighbouring cells with different labels, and the step from the first to the second (m)."""
     first, second, steps = [], [], []
     for axis in (0, 1):
@@ -162,31 +292,6 @@ def _contacts(labels: Labels, height: NDArray[np.float32]) -> tuple[NDArray[np.i
         after = np.where(a[after, columns] == a[rows + 1, columns], after, rows + 1)
         steps.append(h[after, columns] - h[before, columns])
     return np.concatenate(first).astype(np.int64), np.concatenate(second).astype(np.int64), np.concatenate(steps)
-
-
-def _regions(
-    labels: Labels,
-    grid: HeightMap,
-    lab: NDArray[np.float32],
-    keys: NDArray[np.int64],
-    counts: NDArray[np.int64],
-    base: int,
-) -> dict[int, _Region]:
-    regions: dict[int, _Region] = {}
-    low, high = keys // base, keys % base
-    for label in np.unique(labels[labels > 0]):
-        cells = np.argwhere(labels == label)
-        rows, columns = cells.T
-        mine = (low == label) | (high == label)
-        regions[int(label)] = _Region(
-            cells=cells,
-            area=len(cells) * grid.cell**2,
-            colour=np.median(lab[rows, columns], axis=0),
-            top=float(np.percentile(grid.height[rows, columns], 90)),
-            perimeter=int(counts[mine].sum()),
-            outer=int(counts[mine & (low == 0)].sum()),
-        )
-    return regions
 
 
 def _rectangle(cells: NDArray[np.intp], cell: float) -> tuple[float, float, float]:

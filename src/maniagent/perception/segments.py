@@ -39,12 +39,12 @@ class Segment:
 
     @cached_property
     def _footprint(self) -> _Footprint:
-        # The rectangle's sides are cut at the 1st and 99th percentiles: one stray depth pixel mustn't stretch it.
+        # The rectangle's sides are cut a little inside the extremes: one stray depth pixel mustn't stretch it.
         xy = self.points[:, :2].astype(np.float32)
         _, (side, other), degrees = cv2.minAreaRect(xy)
         yaw = float(np.radians(degrees)) + (np.pi / 2 if other > side else 0.0)
         axes = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])  # rows: along, across
-        low, high = np.percentile(xy @ axes.T, [1.0, 99.0], axis=0)
+        low, high = np.percentile(xy @ axes.T, [0.2, 99.8], axis=0)
         length, width = high - low
         return _Footprint((low + high) / 2 @ axes, float(length), float(width), wrap_angle(yaw, np.pi))
 

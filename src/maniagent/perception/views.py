@@ -32,10 +32,11 @@ class Tuning:
 
     height: float = 0.008
     """m above the table plane from which a point belongs to a thing, whatever its colour."""
-    colour: float = 16.0
-    """CIE Lab distance from the table's colour from which a point belongs to a thing, however flat."""
-    lightness_weight: float = 0.25
-    """How much lightness counts in that distance: shadows are dark, too."""
+    chroma: float = 11.0
+    """Distance in the a, b plane of CIE Lab from the table's colour that makes a thing, however flat."""
+    brighter: float = 40.0
+    darker: float = 0.35
+    """A thing of the table's hue is that much lighter (8-bit L), or darker than this share: a shadow is not so dark."""
     plane_band: float = 0.015
     """m around z = 0 in which the table plane is sought: the calibration may be off by that much."""
     min_seen: float = 0.25
@@ -97,9 +98,7 @@ def _view_foreground(
     on_plane = inside & (np.abs(height) < 0.004)
     if not on_plane.any():
         raise CameraFailure(f"The {frame.name} camera sees no table.")
-    difference = lab - np.median(lab[on_plane][::7], axis=0)
-    difference[..., 0] *= tuning.lightness_weight
-    coloured = np.einsum("hwc,hwc->hw", difference, difference) > tuning.colour**2
+    coloured = _differs_from(np.median(lab[on_plane][::7], axis=0), lab, tuning)
     candidates = np.flatnonzero(inside & ((height > tuning.height) | (coloured & (height > -tuning.height))))
     candidate_points = points.reshape(-1, 3)[candidates]
     candidate_points[:, 2] = height.ravel()[candidates]
@@ -108,6 +107,16 @@ def _view_foreground(
     return ViewPoints(
         frame.name, frame.depth.shape, chosen, candidate_points[keep], frame.rgb.reshape(-1, 3)[chosen]
     )  # fmt: skip
+
+
+def _differs_from(table: NDArray[np.float32], lab: NDArray[np.float32], tuning: Tuning) -> BoolArray:
+    """Where an image (H, W, 3) has another colour than the table, lit or in shadow."""
+    lightness = lab[..., 0]
+    # In shadow a surface loses chroma along with lightness (128 is grey in 8-bit Lab).
+    shade = np.minimum(lightness / table[0], np.float32(1.2))[..., None]
+    off_hue = lab[..., 1:] - np.float32(128) - (table[1:] - np.float32(128)) * shade
+    other_hue = np.einsum("hwc,hwc->hw", off_hue, off_hue) > tuning.chroma**2
+    return other_hue | (lightness > table[0] + tuning.brighter) | (lightness < table[0] * tuning.darker)
 
 
 def _check_view(frame: CameraFrame, inside: BoolArray, workspace: Workspace, tuning: Tuning) -> None:
