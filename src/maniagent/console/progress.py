@@ -34,7 +34,7 @@ class Progress:
         self._console = console or Console(stderr=True)
         self._clock = clock
         self._start = clock()
-        self._turn_start = 0.0
+        self._turn_start = self._last = 0.0
         self._turn = 0
         self._subtask = ""
         self._now = "starting"
@@ -67,12 +67,16 @@ class Progress:
         if event.kind == "frame":
             return
         self._now = _NOW.get(event.kind, self._now)
+        self._show(event)
+        self._last = event.time
+
+    def _show(self, event: Event) -> None:
         match event.kind:
             case "run_started":
                 self._tell(Text.assemble(("› ", "cyan"), (event.data["instruction"], "bold")))
             case "observed":
                 if event.data["turn"] != self._turn:
-                    self._turn, self._turn_start, self._subtask = event.data["turn"], event.time, ""
+                    self._turn, self._turn_start, self._subtask = event.data["turn"], self._last, ""
             case "reasoned":
                 self._reasoned(event.data["subtask"])
             case "move":
