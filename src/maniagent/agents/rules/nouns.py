@@ -1,0 +1,140 @@
+"""Noun phrases: from words as said to the one spelling that commands carry.
+
+"the red block which is lying to the left of the plate" becomes "red block that is left of the plate". What a
+phrase means on the table is the lexicon's to say; here it is only made sure that it names one object.
+"""
+
+from __future__ import annotations
+
+import enum
+from collections.abc import Iterator, Sequence
+from itertools import product
+
+from ...perception.phrases import COUNTED_FROM, POSITIONS, RELATIONS, PhraseTable, Pick, Where, spelt
+from .refusals import NeedsLanguageModel, UnclearInstruction, quote, refuse_what_names_no_object
+
+
+class Mark(enum.Enum):
+    """What a phrase does, where it is not simply a place (Where, Pick)."""
+
+    RELATIVE = enum.auto()
+    """What follows describes the noun before it: "that is"."""
+    ONTO = enum.auto()
+    """On, as a goal only."""
+    INTO = enum.auto()
+    """In, as a goal only."""
+    TO = enum.auto()
+    """Some goal: the verb decides."""
+    OFF = enum.auto()
+    """Where the object is taken from: on ... now."""
+    OUT_OF = enum.auto()
+    """Where the object is taken from: in ... now."""
+    UNKNOWN = enum.auto()
+    """A place the rules can't work out."""
+
+
+GOALS = (Mark.ONTO, Mark.INTO, Mark.TO)
+Meaning = Where | Pick | Mark
+
+_RELATIVES = [
+    f"{who} {how}".strip()
+    for who, how in product(
+        ("that is", "which is", ""), ("", "currently", "lying", "sitting", "standing", "resting", "placed", "located")
+    )
+    if who or how not in ("", "currently")
+]
+PHRASES: PhraseTable[Meaning] = PhraseTable(
+    {
+        **RELATIONS,
+        **POSITIONS,
+        **COUNTED_FROM,
+        **dict.fromkeys(_RELATIVES, Mark.RELATIVE),
+        **spelt("at | by", Where.NEXT_TO),
+        **{f"{lead} the {middle} of": Mark.ONTO for lead in ("in", "on") for middle in ("middle", "centre", "center")},
+        **spelt("onto | on to | on top of", Mark.ONTO),
+        **spelt("into | in to", Mark.INTO),
+        **{f"{lead} {on}": Mark.ONTO for lead in ("back", "down") for on in ("on", "onto", "on to", "on top of")},
+        **{f"{lead} {into}": Mark.INTO for lead in ("back", "down") for into in ("in", "into", "in to", "inside")},
+        **spelt("to | towards | toward | over to | back to | up to", Mark.TO),
+        **spelt("off | off of | from | from on", Mark.OFF),
+        **spelt("out of | from inside | from within", Mark.OUT_OF),
+        **spelt("between | under | below | beneath | underneath | above | over | around | across", Mark.UNKNOWN),
+        **spelt("against | opposite | along | through", Mark.UNKNOWN),
+        **{f"{lead} the {part} of": Mark.UNKNOWN for lead in ("on", "at", "in") for part in ("corner", "edge", "rim")},
+    }
+)
+DETERMINERS = frozenset(spelt("a | an | the | this | that | these | those | any", True))
+PRONOUNS = frozenset(spelt("it | them | this | that | these | those", True))
+_LONGEST = 160
+_LONGEST = 160
+_SAID_AS: dict[Meaning, str] = {Mark.ONTO: "on", Mark.INTO: "in", Mark.OFF: "on", Mark.OUT_OF: "in"}
+
+
+def scan(words: Sequence[str]) -> Iterator[tuple[tuple[str, ...], Meaning | None]]:
+    """`words` cut into phrases with their meaning, and single other words with None.
+
+    "On the left" is a position at the end of a phrase; in "on the left plate" it is "on" and a plate.
+    """
+    start = 0
+    while start < len(words):
+        meaning, count = PHRASES.match(words, start) or (None, 1)
+        noun_follows = start + count < len(words) and not PHRASES.match(words, start + count)
+        if isinstance(meaning, Pick) and noun_follows:
+            meaning, count = PHRASES.match(words[: start + 1], start) or (None, 1)
+        yield tuple(words[start : start + count]), meaning
+        start += count
+
+
+def noun_phrase(words: Sequence[str]) -> str:
+    """The canonical spelling of a noun phrase, without its article.
+
+    Raises UnclearInstruction for a phrase without a noun, of several objects, or with a place the rules don't know,
+    and NeedsLanguageModel for one that is no description by looks and places.
+    """
+    refuse_what_names_no_object(words)
+    said: list[str] = ["any"] if list(words[:1]) == ["any"] or list(words[:3]) == ["one", "of", "the"] else []
+    named, after = False, None
+    for phrase, meaning in scan(_without_article(words)):
+        if isinstance(meaning, Pick) and named:
+            said += phrase
+        elif meaning is Mark.RELATIVE and named and after is None:
+            after = meaning
+            continue
+        elif meaning is not None and named:
+            said += _relation(meaning, words)
+            named = False
+        elif meaning is None and after is Mark.RELATIVE:
+            raise NeedsLanguageModel(f"{quote(words)} describes an object by more than its looks and place.")
+        elif phrase[0] not in DETERMINERS:
+            said += phrase
+            named = True
+        elif named:
+            raise NeedsLanguageModel(f"{quote(words)} is no name of one object.")
+        after = None
+    if not named or after is not None:
+        raise UnclearInstruction(f"{quote(words)} doesn't say which object: a noun is missing.")
+    phrase_said = " ".join(said)
+    if len(phrase_said) > _LONGEST:
+        raise UnclearInstruction(f"{quote(words)} is too long for one object: describe it in {_LONGEST} characters.")
+    return phrase_said
+
+
+def _without_article(words: Sequence[str]) -> list[str]:
+    start = 3 if list(words[:3]) == ["one", "of", "the"] else 0
+    while start < len(words) and words[start] in DETERMINERS:
+        start += 1
+    return list(words[start:])
+
+
+def _relation(meaning: Meaning, words: Sequence[str]) -> list[str]:
+    """How a relation to the landmark that follows is spelt within a noun phrase."""
+    if meaning in (Where.CLOSEST, Where.FARTHEST):
+        return [str(meaning.value), "the"]
+    if isinstance(meaning, Where):
+        return ["that is", meaning.value, "the"]
+    if meaning in _SAID_AS:
+        return ["that is", _SAID_AS[meaning], "the"]
+    raise UnclearInstruction(
+        f"{quote(words)} describes a place the rules can't work out. They know: "
+        f"{', '.join(where.value for where in Where)}, and '(0.30, 0.10)'."
+    )
