@@ -4,7 +4,7 @@
 >>> attach(spec, make_object("block", size=0.03, colour="yellow"), "target")
 """
 
-from .attach import attach
+from .bodies import attach
 from .catalogue import make_object, object_names
 from .model import ObjectModel
 

@@ -5,8 +5,8 @@ from __future__ import annotations
 import numpy as np
 
 from .mesh import Mesh, lathe, merge, prism, sweep
-from .model import Contact, Finish, ObjectModel, Visual, assemble
-from .pieces import Piece, box_piece, ellipsoid_piece
+from .model import Finish, ObjectModel, Visual, assemble
+from .pieces import Contact, Piece, box_piece, ellipsoid_piece
 
 CUTLERY = Contact(sliding=0.6, torsional=0.006, rolling=0.0002)
 STEEL = Finish((0.66, 0.68, 0.72), specular=0.9, shininess=0.7)
@@ -81,28 +81,15 @@ def fork() -> ObjectModel:
 
 def knife() -> ObjectModel:
     """A steel table knife, blade towards +x, its edge towards +y."""
-    thick, back, edge, start, tip = 0.0030, -0.006, 0.0135, -0.004, 0.075
-    blade = prism(
-        [
-            (start, back),
-            (0.060, back),
-            (0.068, -0.0035),
-            (0.0735, 0.002),
-            (tip, 0.008),
-            (0.0735, 0.0125),
-            (0.066, edge),
-            (0.020, 0.0118),
-            (0.006, 0.011),
-            (start, 0.006),
-        ],
-        thick,
-        0.0006,
-    )
+    thick, spine, edge, start, tip = 0.0030, -0.0075, 0.0125, -0.004, 0.075
+    belly = [(0.071, 0.0015), (0.065, 0.0065), (0.056, 0.0105), (0.045, edge), (0.010, edge), (0.004, 0.0105)]
+    outline = [(start, -0.0055), (0.004, spine), (tip - 0.004, spine), (tip, -0.0055), *belly, (start, 0.0055)]
     pieces = [
         *_handle_pieces(-0.004, 0.002),
-        box_piece((0.066, edge - back - 0.001, thick), (0.035, (edge + back) / 2, thick / 2)),
-        box_piece((0.008, 0.011, thick), (0.071, 0.007, thick / 2)),
+        box_piece((0.052, edge - spine, thick), (0.030, (edge + spine) / 2, thick / 2)),
+        box_piece((0.018, 0.011, thick), (0.065, spine + 0.0055, thick / 2)),
     ]
+    blade = prism(outline, thick, 0.0006)
     return assemble(
         "knife", "knife", [Visual(merge([_handle(-0.004, 0.002), blade]), STEEL)], pieces, mass=0.060, contact=CUTLERY
     )

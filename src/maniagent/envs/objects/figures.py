@@ -7,8 +7,8 @@ import numpy as np
 from . import textures
 from .implicit import ball, limb, melt, slab, surface
 from .mesh import Mesh, merge, sweep
-from .model import Contact, Finish, ObjectModel, Visual, assemble
-from .pieces import box_piece, capsule_piece, ellipsoid_piece
+from .model import Finish, ObjectModel, Visual, assemble
+from .pieces import Contact, box_piece, capsule_piece, ellipsoid_piece
 
 
 def toy() -> ObjectModel:

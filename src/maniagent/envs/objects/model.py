@@ -10,7 +10,7 @@ from numpy.typing import NDArray
 
 from ...geometry import FloatArray
 from .mesh import Mesh
-from .pieces import Piece
+from .pieces import Contact, Piece
 
 Colour = tuple[float, float, float]
 """Red, green, blue in [0, 1]."""
@@ -37,17 +37,6 @@ class Visual:
 
 
 @dataclass(frozen=True, eq=False)
-class Contact:
-    """How an object's surface holds on to others; MuJoCo's units."""
-
-    sliding: float = 0.8
-    torsional: float = 0.008
-    """m: a soft fingertip resists turning about the contact's normal."""
-    rolling: float = 0.0004
-    """m: what keeps round things from rolling away."""
-
-
-@dataclass(frozen=True, eq=False)
 class ObjectModel:
     """One kind of object, ready to be put into a scene. The body's origin is the middle of its bounding box."""
 
@@ -69,6 +58,7 @@ class ObjectModel:
     visuals: tuple[Visual, ...]
     pieces: tuple[Piece, ...]
     contact: Contact = field(default_factory=Contact)
+    """Of the pieces that have none of their own."""
 
 
 def assemble(

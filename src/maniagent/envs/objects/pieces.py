@@ -2,13 +2,26 @@
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import mujoco
 import numpy as np
 from numpy.typing import ArrayLike
 
 from ...geometry import FloatArray
+
+
+@dataclass(frozen=True)
+class Contact:
+    """How a surface holds on to others; MuJoCo's friction coefficients."""
+
+    sliding: float = 0.8
+    torsional: float = 0.008
+    """m: a soft fingertip resists turning about the contact's normal."""
+    rolling: float = 0.0004
+    """m: what keeps round things from rolling away."""
+    priority: int = 0
+    """Of two surfaces in contact the greater priority's values hold; between equals, the greater values."""
 
 
 @dataclass(frozen=True, eq=False)
@@ -22,6 +35,8 @@ class Piece:
     """(3,) m."""
     rotation: FloatArray
     """(3, 3), piece to object."""
+    contact: Contact | None = None
+    """Where it differs from the rest of the object."""
 
     @property
     def volume(self) -> float:
@@ -51,7 +66,7 @@ class Piece:
 
     def shifted(self, offset: ArrayLike) -> Piece:
         """The piece moved by `offset` (3,) m."""
-        return Piece(self.shape, self.size, self.centre + np.asarray(offset, float), self.rotation)
+        return replace(self, centre=self.centre + np.asarray(offset, float))
 
 
 def box_piece(size: ArrayLike, centre: ArrayLike, rotation: ArrayLike | None = None) -> Piece:

@@ -7,8 +7,8 @@ import numpy as np
 from ...geometry import FloatArray
 from . import textures
 from .mesh import Mesh, lathe, loft, merge, sweep
-from .model import Contact, Finish, ObjectModel, Visual, assemble
-from .pieces import box_piece, capsule_piece, ellipsoid_piece
+from .model import Finish, ObjectModel, Visual, assemble
+from .pieces import Contact, box_piece, capsule_piece, ellipsoid_piece
 from .shapes import FLAT, bow, capsules_along, lying, profile, resting
 
 ROUND = Contact(sliding=0.9, torsional=0.008, rolling=0.001)
@@ -30,11 +30,11 @@ def chili(colour: str) -> ObjectModel:
     s = np.linspace(-0.004, 0.021, 9)
     stem_curve = np.column_stack([neck + s[:, None] * out, root_z + 6.0 * np.maximum(s, 0) ** 2])
     stalk = sweep(stem_curve, np.interp(s, [0, 0.004, 0.017, 0.021], [0.0034, 0.0025, 0.0026, 0.0034]), sides=10)
-    s = np.linspace(-0.007, 0.0035, 7)
+    shoulder = np.searchsorted(t, 0.11)
     calyx = sweep(
-        np.column_stack([neck + s[:, None] * out, np.full(7, root_z + 0.001)]),
-        np.interp(s, [-0.007, -0.003, 0.001, 0.0035], [0.0122, 0.0108, 0.0068, 0.003]),
-        sides=12,
+        np.concatenate([stem_curve[[2, 1]], np.column_stack([xy, radius - FLAT])[2:shoulder]]),
+        np.concatenate([[0.0030, 0.0050], radius[2:shoulder] + np.linspace(0.001, 0.0003, shoulder - 2)]),
+        sides=14,
     )
     leaf = Finish(stem, specular=0.15)
     pieces = capsules_along(xy, radius, 5)
@@ -103,7 +103,7 @@ def eggplant() -> ObjectModel:
     """A small eggplant; its calyx and stem towards -x."""
     t, radius = profile(
         [0, 0.03, 0.12, 0.35, 0.6, 0.78, 0.9, 0.97, 1],
-        np.array([1, 9, 12.5, 14.8, 18.2, 18.9, 16.2, 10.5, 3]) / 1000,
+        np.array([1, 9.5, 13.4, 16.4, 18.3, 18.8, 16.2, 10.5, 3]) / 1000,
         28,
     )
     xy = np.column_stack([-0.041 + 0.096 * t, np.zeros_like(t)])
@@ -122,7 +122,7 @@ def eggplant() -> ObjectModel:
         np.array([4.2, 3.8, 3.6, 3.8, 4.6, 7.0]) / 1000,
         sides=10,
     )
-    pieces = capsules_along(xy, radius, 4, height=lambda r: float(axis_z))
+    pieces = capsules_along(xy, radius, 5, height=lambda r: float(axis_z))
     pieces.append(capsule_piece((-0.051, 0, axis_z + 0.002), (-0.040, 0, axis_z), 0.0042))
     pieces.append(box_piece((0.034, 0.007, 0.010), (0.026, 0.0, 0.005)))
     return assemble(
@@ -148,7 +148,7 @@ def banana() -> ObjectModel:
     xy = np.column_stack([np.interp(t * steps[-1], steps, curve[:, axis]) for axis in (0, 1)])
     yellow, green, brown = (0.98, 0.80, 0.10), (0.72, 0.74, 0.16), (0.25, 0.16, 0.06)
     skin = textures.along(
-        [brown, brown, green, yellow, yellow, green, brown, brown], [0, 0.025, 0.06, 0.17, 0.87, 0.92, 0.945, 1]
+        [brown, brown, green, yellow, yellow, green, brown, brown], [0, 0.03, 0.06, 0.2, 0.87, 0.92, 0.945, 1]
     )
     body = sweep(np.column_stack([xy, radius - FLAT + 0.15 * (0.016 - radius)]), radius, sides=20, squareness=2.0)
     return assemble(
@@ -208,7 +208,7 @@ def egg() -> ObjectModel:
     radius *= 0.020 / radius.max()
     xy = np.column_stack([x, np.zeros_like(x)])
     axis_z = radius.max() - FLAT
-    shell = textures.speckled((0.89, 0.68, 0.50), (0.74, 0.50, 0.34), 0.22, cells=44)
+    shell = textures.speckled((0.89, 0.68, 0.50), (0.80, 0.57, 0.41), 0.12, cells=40)
     pieces = [
         ellipsoid_piece((0.052, 0.0395, 0.0395), (-0.0005, 0.0, axis_z)),
         box_piece((0.012, 0.008, 0.006), (-0.002, 0.0, 0.003)),

@@ -15,6 +15,9 @@ from .pieces import Piece, capsule_piece
 FLAT = 0.0005
 """m, how deep the underside of round things is flattened, so that they lie still."""
 
+STUB = 0.001
+"""m, the shortest capsule's straight part."""
+
 
 def bow(length: float, sagitta: float, count: int = 24) -> FloatArray:
     """Points (count, 2) of a parabola along x whose middle lies `sagitta` to the left (+y) of its ends."""
@@ -70,11 +73,9 @@ def capsules_along(
     pieces = []
     for index, (low, high) in enumerate(pairwise(edges)):
         r = float(np.interp((low + high) / 2, s, radius)) - FLAT / 2
-        start = low + (r if index == 0 else 0.0)
-        end = high - (r if index == count - 1 else 0.0)
-        if end - start < 1e-3:  # a stub shorter than it is thick: all but a sphere
-            middle = (start + end) / 2
-            start, end = middle - 5e-4, middle + 5e-4
+        start, end = (low + r if index == 0 else low), (high - r if index == count - 1 else high)
+        if end - start < STUB:  # the end of a thick body: all but a sphere
+            start, end = (start, start + STUB) if index == 0 else (end - STUB, end)
         z = r if height is None else height(r)
         pieces.append(capsule_piece([*point(start), z], [*point(end), z], r))
     return pieces

@@ -2,14 +2,18 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 
 from ...geometry import FloatArray, rotation_z
 from . import textures
 from .mesh import lathe, loft, prism, rounded_rectangle
-from .model import Colour, Contact, Finish, ObjectModel, Visual, assemble
-from .pieces import Piece, box_piece, cylinder_piece
+from .model import Colour, Finish, ObjectModel, Visual, assemble
+from .pieces import Contact, Piece, box_piece, cylinder_piece
 
+SLIPPERY = Contact(sliding=0.3, torsional=0.005, rolling=0.001, priority=1)
+"""The underside of what a gripper drags over the table, whatever the table is made of."""
 GLAZED = Contact(sliding=0.5, torsional=0.005, rolling=0.0002)
 
 
@@ -40,7 +44,7 @@ def plate() -> ObjectModel:
         "plate",
         [Visual(lathe(walls, sides=48), _glazed(walls, colours))],
         pieces,
-        mass=0.250,
+        mass=0.180,
         surface_z=floor,
         contact=GLAZED,
     )
@@ -69,7 +73,7 @@ def dish() -> ObjectModel:
         "small dish",
         [Visual(lathe(walls, sides=40), _glazed(walls, colours))],
         pieces,
-        mass=0.110,
+        mass=0.080,
         surface_z=floor,
         contact=GLAZED,
     )
@@ -106,7 +110,7 @@ def basket() -> ObjectModel:
         "basket",
         [Visual(shell, straw), Visual(bottom, straw)],
         _basket_pieces(length, width, height, wall, floor, corner),
-        mass=0.180,
+        mass=0.120,
         surface_z=floor,
         contact=Contact(sliding=0.6),
     )
@@ -114,7 +118,8 @@ def basket() -> ObjectModel:
 
 def _basket_pieces(length: float, width: float, height: float, wall: float, floor: float, corner: float) -> list[Piece]:
     """A floor, four walls, and a slanted post across each corner."""
-    pieces = [box_piece((length - 2 * wall, width - 2 * wall, floor), (0, 0, floor / 2))]
+    bottom = box_piece((length - 2 * wall, width - 2 * wall, floor), (0, 0, floor / 2))
+    pieces = [replace(bottom, contact=SLIPPERY)]
     rise, middle = height - floor / 2, (height + floor / 2) / 2
     for sign in (-1, 1):
         pieces.append(box_piece((length - 2 * corner + 0.006, wall, rise), (0, sign * (width - wall) / 2, middle)))
@@ -170,8 +175,9 @@ def _round_floor(radius: float, height: float) -> list[Piece]:
     The slab alone touches the table and bears what lies in the middle: boxes have few and exact contacts.
     """
     side = np.sqrt(2.0) * radius
+    slab = box_piece((side, side, height), (0.0, 0.0, height / 2))
     return [
-        box_piece((side, side, height), (0.0, 0.0, height / 2)),
+        replace(slab, contact=SLIPPERY),
         cylinder_piece(radius, height - 0.0012, (0.0, 0.0, height / 2)),
     ]
 

@@ -7,8 +7,8 @@ import numpy as np
 from ...errors import UsageError
 from . import textures
 from .mesh import Mesh, box, merge, sweep
-from .model import Colour, Contact, Finish, ObjectModel, Visual, assemble
-from .pieces import box_piece, capsule_piece
+from .model import Colour, Finish, ObjectModel, Visual, assemble
+from .pieces import Contact, box_piece, capsule_piece
 from .shapes import FLAT
 
 BLOCK_COLOURS: dict[str, Colour] = {
@@ -33,7 +33,10 @@ def block(size: float | tuple[float, float, float] = 0.04, colour: str = "red") 
 
     Raises UsageError for an unknown colour or an edge outside `BLOCK_EDGE`.
     """
-    edges = np.broadcast_to(np.asarray(size, float), (3,)).copy()
+    try:
+        edges = np.broadcast_to(np.asarray(size, float), (3,)).copy()
+    except (TypeError, ValueError):
+        raise UsageError(f"A block's size is one edge or three, in metres, not {size!r}.") from None
     if not np.all((edges >= BLOCK_EDGE[0]) & (edges <= BLOCK_EDGE[1])):
         raise UsageError(f"A block's edges must be {BLOCK_EDGE[0]} to {BLOCK_EDGE[1]} m long, not {size}.")
     if colour not in BLOCK_COLOURS:

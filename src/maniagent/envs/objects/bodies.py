@@ -68,7 +68,7 @@ def _add_visual(spec: mujoco.MjSpec, body: mujoco.MjsBody, visual: Visual, name:
 def _add_piece(body: mujoco.MjsBody, piece: Piece, model: ObjectModel, mass: float, name: str) -> None:
     quaternion = np.empty(4)
     mujoco.mju_mat2Quat(quaternion, piece.rotation.ravel())
-    contact = model.contact
+    contact = piece.contact or model.contact
     body.add_geom(
         name=name,
         type=piece.shape,
@@ -79,4 +79,5 @@ def _add_piece(body: mujoco.MjsBody, piece: Piece, model: ObjectModel, mass: flo
         mass=mass,
         condim=6,
         friction=[contact.sliding, contact.torsional, contact.rolling],
+        priority=contact.priority,
     )
