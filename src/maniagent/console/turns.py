@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from collections.abc import Sequence
 from typing import Any
 
 from . import page
@@ -10,6 +11,18 @@ from .page import badge, text
 from .story import Story, Turn
 
 Json = dict[str, Any]
+
+_PARTS = {
+    "centre": "middle",
+    "grasp": "grasp",
+    "surface": "where things rest on it",
+    "top": "top",
+    "base": "underside",
+    "left": "left of it",
+    "right": "right of it",
+    "near": "before it",
+    "far": "behind it",
+}
 
 
 def turn_card(story: Story, turn: Turn) -> str:
@@ -134,19 +147,22 @@ def _sequence(turn: Turn) -> str:
 
 
 def _where(step: Json, names: dict[int, str]) -> str:
-    anchor, (x, y, z) = step["anchor"], step["offset"]
+    anchor = step["anchor"]
     if "index" in anchor:
-        side = {"centre": "middle", "surface": "on top", "grasp": "grasp"}.get(anchor["part"], f"{anchor['part']} side")
-        place = f"{_object(anchor['index'], names)}, {side}"
+        place = f"{_object(anchor['index'], names)}, {_PARTS.get(anchor['part'], anchor['part'])}"
     else:
         place = _point((anchor["x"], anchor["y"], anchor["z"]))
-    if not (x or y):
-        place += f" {100 * z:+.1f} cm up" if z else ""
-    else:
-        place += f" + {_point((x, y, z))}"
+    place += _offset(step["offset"], step.get("offset_frame", "base"))
     if step["carrying"] is not None:
         place += f" <small>carrying {_object(step['carrying'], names)}</small>"
     return place
+
+
+def _offset(offset: Sequence[float], frame: str) -> str:
+    x, y, z = offset
+    if x or y:
+        return f" + {_point(offset)}" + (" as the viewer sees it" if frame == "viewer" else "")
+    return f" {100 * z:+.1f} cm up" if z else ""
 
 
 def _turned(orientation: Json, names: dict[int, str]) -> str:
