@@ -107,7 +107,7 @@ def eggplant() -> ObjectModel:
         28,
     )
     xy = np.column_stack([-0.041 + 0.096 * t, np.zeros_like(t)])
-    axis_z = radius.max() - FLAT
+    axis_z = float(radius.max()) - FLAT
     angle = 2 * np.pi * np.arange(20) / 20
     tooth = (np.arange(20) % 4 == 0).astype(float) + 0.45 * (np.arange(20) % 2)
     rings = []
@@ -122,7 +122,7 @@ def eggplant() -> ObjectModel:
         np.array([4.2, 3.8, 3.6, 3.8, 4.6, 7.0]) / 1000,
         sides=10,
     )
-    pieces = capsules_along(xy, radius, 5, height=lambda r: float(axis_z))
+    pieces = capsules_along(xy, radius, 5, axis_z)
     pieces.append(capsule_piece((-0.051, 0, axis_z + 0.002), (-0.040, 0, axis_z), 0.0042))
     pieces.append(box_piece((0.034, 0.007, 0.010), (0.026, 0.0, 0.005)))
     return assemble(
@@ -165,7 +165,7 @@ def strawberry() -> ObjectModel:
     """A strawberry on its side, leaves towards -x."""
     t, radius = profile([0, 0.05, 0.2, 0.4, 0.7, 0.9, 1], np.array([2, 10, 13.6, 14.0, 10.2, 5.6, 1.5]) / 1000, 22)
     xy = np.column_stack([-0.0145 + 0.032 * t, np.zeros_like(t)])
-    axis_z = radius.max() - FLAT
+    axis_z = float(radius.max()) - FLAT
     height, width = 128, 128
     v, u = textures.grid(height, width)
     row = np.floor(v * 9)
@@ -183,7 +183,7 @@ def strawberry() -> ObjectModel:
     turned = crown.vertices[:, [2, 0, 1]] * [-1.0, 1.0, 1.0] + [-0.0135, 0.0, axis_z]
     leaves = Mesh(turned, crown.faces[:, ::-1], crown.uv[:, ::-1]).cut_below(0.0)
     pieces = [
-        capsule_piece((-0.0025, 0, axis_z), (0.0, 0, axis_z), float(axis_z)),
+        capsule_piece((-0.0025, 0, axis_z), (0.0, 0, axis_z), axis_z - FLAT / 4),
         capsule_piece((0.005, 0, axis_z), (0.010, 0, axis_z), 0.0068),
         box_piece((0.012, 0.007, 0.006), (-0.001, 0.0, 0.003)),
     ]
@@ -207,10 +207,10 @@ def egg() -> ObjectModel:
     radius = 0.020 * np.sqrt(np.maximum(4 * t * (1 - t), 1e-5)) * (1.0 - 0.16 * (t - 0.42) / 0.5)
     radius *= 0.020 / radius.max()
     xy = np.column_stack([x, np.zeros_like(x)])
-    axis_z = radius.max() - FLAT
+    axis_z = float(radius.max()) - FLAT
     shell = textures.speckled((0.89, 0.68, 0.50), (0.80, 0.57, 0.41), 0.12, cells=40)
     pieces = [
-        ellipsoid_piece((0.052, 0.0395, 0.0395), (-0.0005, 0.0, axis_z)),
+        ellipsoid_piece((0.052, 0.0388, 0.0388), (-0.0005, 0.0, axis_z)),
         box_piece((0.012, 0.008, 0.006), (-0.002, 0.0, 0.003)),
     ]
     return assemble(
@@ -230,7 +230,7 @@ def corn() -> ObjectModel:
     )
     xy = np.column_stack([-0.046 + 0.103 * t, np.zeros_like(t)])
     axis_z = 0.0185
-    pieces = capsules_along(xy, radius, 4, height=lambda r: axis_z)
+    pieces = capsules_along(xy, radius, 4, axis_z)
     pieces.append(capsule_piece((-0.0525, 0, axis_z), (-0.045, 0, axis_z), 0.0085))
     pieces.append(box_piece((0.060, 0.010, 0.008), (-0.008, 0.0, 0.004)))
     body = sweep(np.column_stack([xy, np.full(len(t), axis_z)]), radius, sides=28).cut_below(0.0004)

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Callable
 from itertools import pairwise
 
 import numpy as np
@@ -56,12 +55,11 @@ def lying(xy: FloatArray, radius: FloatArray, *, sides: int = 20) -> Mesh:
     return sweep(np.column_stack([xy, radius - FLAT]), radius, sides=sides).cut_below(0.0)
 
 
-def capsules_along(
-    xy: FloatArray, radius: FloatArray, count: int, height: Callable[[float], float] | None = None
-) -> list[Piece]:
+def capsules_along(xy: FloatArray, radius: FloatArray, count: int, axis_z: float | None = None) -> list[Piece]:
     """`count` level capsules that fill a round body along `xy` (R, 2) with `radius` (R,).
 
-    `height` gives a capsule's axis height from its radius; without it each capsule lies on z = 0.
+    Their axes are at height `axis_z`, their undersides just above the table: the body rests on another piece, its
+    flat. Without it each lies on z = 0.
     """
     steps = np.linalg.norm(np.diff(xy, axis=0), axis=1)
     s = np.concatenate([[0.0], np.cumsum(steps)])
@@ -73,9 +71,11 @@ def capsules_along(
     pieces = []
     for index, (low, high) in enumerate(pairwise(edges)):
         r = float(np.interp((low + high) / 2, s, radius)) - FLAT / 2
+        if axis_z is not None:
+            r = min(r, axis_z - FLAT / 4)
         start, end = (low + r if index == 0 else low), (high - r if index == count - 1 else high)
         if end - start < STUB:  # the end of a thick body: all but a sphere
             start, end = (start, start + STUB) if index == 0 else (end - STUB, end)
-        z = r if height is None else height(r)
+        z = r if axis_z is None else axis_z
         pieces.append(capsule_piece([*point(start), z], [*point(end), z], r))
     return pieces

@@ -62,7 +62,7 @@ def marker() -> ObjectModel:
     cap = _rod([0.0150, 0.0155, 0.0480, 0.0575, 0.0600], [7.4, 8.0, 8.0, 6.6, 4.6], z)
     clip = box((0.036, 0.0036, 0.0018), 0.0005).shifted((0.036, 0.0, z + radius - 0.0004))
     pieces = [
-        capsule_piece((-0.0515, 0, z), (0.0515, 0, z), radius - FLAT / 2),
+        capsule_piece((-0.0515, 0, z), (0.0515, 0, z), z - FLAT / 4),
         box_piece((0.080, 0.0045, 0.006), (0.0, 0.0, 0.003)),
     ]
     return assemble(
