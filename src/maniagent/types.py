@@ -266,6 +266,10 @@ class Part(enum.StrEnum):
     """Where its best grasp puts the TCP."""
     SURFACE = "surface"
     """Middle of the object at the height where a thing put onto it comes to rest."""
+    TOP = "top"
+    """Middle of the object at the height of its highest point."""
+    BASE = "base"
+    """Middle of its underside."""
     LEFT = "left"
     """On the table beside the object, a hand's gap clear of it; likewise the other three."""
     RIGHT = "right"
@@ -288,6 +292,12 @@ class PointAnchor(_Written):
     x: Metres
     y: Metres
     z: Metres = 0.0
+
+
+class HereAnchor(_Written):
+    """Where the step before leaves the TCP; for ways straight up."""
+
+    here: Literal[True]
 
 
 class Orientation(_Written):
@@ -318,9 +328,11 @@ class ActionStep(_Written):
     """One Cartesian key point, stated relative to objects, so that it holds when they move."""
 
     description: Text
-    anchor: ObjectAnchor | PointAnchor
+    anchor: ObjectAnchor | PointAnchor | HereAnchor
     offset: tuple[Metres, Metres, Metres] = (0.0, 0.0, 0.0)
-    """m, base frame, added to the anchor."""
+    """m, added to the anchor: along base x, y, z; or, with `offset_frame` "viewer", to the viewer's right, away from
+    the viewer, and up."""
+    offset_frame: Literal["base", "viewer"] = "base"
     carrying: Annotated[int, Field(ge=0, le=63)] | None = None
     """Index of the object in the gripper: then the middle of its underside, not the TCP, arrives at the target."""
     orientation: Orientation = Orientation()

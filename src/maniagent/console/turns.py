@@ -150,6 +150,8 @@ def _where(step: Json, names: dict[int, str]) -> str:
     anchor = step["anchor"]
     if "index" in anchor:
         place = f"{_object(anchor['index'], names)}, {_PARTS.get(anchor['part'], anchor['part'])}"
+    elif "here" in anchor:
+        place = "from there"
     else:
         place = _point((anchor["x"], anchor["y"], anchor["z"]))
     place += _offset(step["offset"], step.get("offset_frame", "base"))

@@ -35,9 +35,7 @@ def _add_table(spec: mujoco.MjSpec) -> None:
     along = rng.normal(0.0, 1.0, (size, 8)).cumsum(axis=0)
     grain = np.repeat(along / np.abs(along).max(), size // 8, axis=1) * 3.0 + rng.normal(0.0, 1.5, (size, size))
     pixels = np.clip(np.array([172.0, 163.0, 151.0]) + grain[..., None], 0, 255).astype(np.uint8)
-    texture = spec.add_texture(
-        name="table", type=mujoco.mjtTexture.mjTEXTURE_2D, width=size, height=size, nchannel=3
-    )
+    texture = spec.add_texture(name="table", type=mujoco.mjtTexture.mjTEXTURE_2D, width=size, height=size, nchannel=3)
     texture.data = pixels.tobytes()
     material = spec.add_material(name="table", specular=0.05, shininess=0.1, texrepeat=[2, 2])
     material.textures[mujoco.mjtTextureRole.mjTEXROLE_RGB] = texture.name

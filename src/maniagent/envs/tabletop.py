@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
-from typing import Any, ClassVar
+from typing import Any
 
 import gymnasium as gym
 import mujoco
@@ -53,7 +53,10 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
     is given: success is a task's predicate on `truth()`, not the environment's business.
     """
 
-    metadata: ClassVar[dict[str, Any]] = {"render_modes": ["rgb_array", "human"], "render_fps": 10}
+    metadata: dict[str, Any] = {  # noqa: RUF012 - gymnasium's own declaration
+        "render_modes": ["rgb_array", "human"],
+        "render_fps": 10,
+    }
 
     def __init__(
         self,
@@ -104,9 +107,10 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         low, high = self.model.jnt_range[[self.model.joint(name).id for name in JOINTS]].T
         finger_low, finger_high = self.model.joint("left_finger").range
         self.opening_range = (2 * (float(finger_low) - PAD_INSET), 2 * (float(finger_high) - PAD_INSET))
-        self.action_space = gym.spaces.Box(
+        self._action_bounds = gym.spaces.Box(
             np.append(low, self.opening_range[0]), np.append(high, self.opening_range[1]), dtype=np.float64
         )
+        self.action_space = self._action_bounds
         images: dict[str, gym.spaces.Space[Any]] = {}
         for camera in self.cameras:
             shape = (camera.height, camera.width)
@@ -146,11 +150,12 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
 
     def step(self, action: NDArray[np.float64]) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
         """One control period. Actions outside the action space are clipped."""
-        action = np.clip(action, self.action_space.low, self.action_space.high)  # type: ignore[attr-defined]
+        bounds = self._action_bounds
+        action = np.clip(action, bounds.low, bounds.high)
         self.advance(action[:6], float(action[6]))
         return self._gym_observation(), 0.0, False, False, {}
 
-    def render(self) -> NDArray[np.uint8]:  # type: ignore[override]  # gymnasium allows more kinds of frames
+    def render(self) -> NDArray[np.uint8]:
         """The main view without noise, (H, W, 3) uint8."""
         return self._render(self.cameras[0])[0]
 

@@ -67,7 +67,7 @@ def build_height_map(views: Sequence[ViewPoints], workspace: Workspace, cell: fl
     if views and sum(len(view.points) for view in views):
         points = np.concatenate([view.points for view in views])
         colours = np.concatenate([view.colours for view in views])
-        index = ((points[:, :2] - np.float32(origin)) / np.float32(cell)).astype(np.int32)
+        index = ((points[:, :2] - np.array(origin, np.float32)) / np.float32(cell)).astype(np.int32)
         np.clip(index, 0, np.array(shape, np.int32) - 1, out=index)
         flat = index[:, 0] * shape[1] + index[:, 1]
         # Written in ascending order of height, the topmost point of each cell comes last and stays.

@@ -257,7 +257,7 @@ def _basins(grid: HeightMap) -> tuple[Labels, FloatArray]:
     kernel = np.ones((3, 3), np.uint8)
     level_of = np.zeros(grid.height.shape, np.float32)
     for level in WATER_LEVELS:
-        wall = cv2.morphologyEx((grid.height > level).astype(np.uint8), cv2.MORPH_CLOSE, kernel)
+        wall = np.asarray(cv2.morphologyEx((grid.height > level).astype(np.uint8), cv2.MORPH_CLOSE, kernel), np.uint8)
         level_of[_holes(wall) & grid.occupied] = level
     count, basins, stats, _ = cv2.connectedComponentsWithStats((level_of > 0).astype(np.uint8), connectivity=4)
     levels = np.zeros(count)

@@ -86,9 +86,10 @@ def _split(grid: HeightMap) -> Labels:
         step = np.abs(grid.height[low] - grid.height[high]) > HEIGHT_STEP
         edges[middle] |= both & (colour | step)
     seeds = (grid.occupied & ~edges).astype(np.uint8)
-    count, markers, stats, _ = cv2.connectedComponentsWithStats(seeds, connectivity=4)
+    count, found, stats, _ = cv2.connectedComponentsWithStats(seeds, connectivity=4)
+    markers = np.asarray(found, np.int32)
     small = stats[:, cv2.CC_STAT_AREA] < MIN_SEED
-    markers = np.where(small[markers], 0, markers)
+    markers = np.where(small[markers], 0, markers).astype(np.int32)
     markers = _seed_the_unseeded(markers, grid.occupied, count)
     markers[~grid.occupied] = markers.max() + 1  # a region of its own for the table, so that nothing floods it
     relief = np.clip(grid.height * (255.0 / 0.10), 0, 255)

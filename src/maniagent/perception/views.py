@@ -85,7 +85,7 @@ def _view_foreground(
 ) -> ViewPoints:
     # The median takes out most of the depth noise and keeps edges; it can't handle NaN, zero stands for it.
     known = np.isfinite(frame.depth) & (frame.depth > 0)
-    depth = cv2.medianBlur(np.where(known, frame.depth, np.float32(0)), 5)
+    depth = np.asarray(cv2.medianBlur(np.where(known, frame.depth, np.float32(0)), 5), np.float32)
     known &= depth > 0
     points = transform_points(frame.T_base_camera.astype(np.float32), backproject(frame.K, depth))
     inside = known.copy()

@@ -1,0 +1,208 @@
+"""The loop: look, describe, reason, locate, write, bind, move, look again (ManiAgent, figure 2).
+
+One sub-task a turn, planned against the table as it is now. Whatever fails is told to the observers, goes into
+memory and is retried within the budget; whatever happens, the arm ends at rest in its safe pose.
+"""
+
+from __future__ import annotations
+
+import time
+from collections import defaultdict
+from collections.abc import Iterator, Sequence
+from contextlib import contextmanager
+from dataclasses import dataclass, replace
+
+from ..errors import CameraFailure, FormatFailure, GraspFailure, MotionRejected, StageFailure
+from ..perception.viewpoint import Viewpoint
+from ..robots.robot import Boxes, Robot
+from ..types import (
+    ActionSequence,
+    ExecutionReport,
+    KeyPoint,
+    ObjectInfo,
+    Observation,
+    RunResult,
+    RunVerdict,
+    Subtask,
+    SubtaskRecord,
+)
+from .binding import bind
+from .events import EventLog
+from .memory import Memory
+from .protocols import Agents, Located
+
+
+@dataclass(frozen=True)
+class Budget:
+    """How long a run may go on."""
+
+    turns: int = 20
+    seconds: float = 900.0
+    """Wall time."""
+    failed_looks: int = 3
+    """Turns in a row that may end without an attempt (nothing seen, nothing understood) before the run gives up."""
+    answers: int = 3
+    """Action sequences the controller may write for one sub-task: the first and its repairs."""
+    grasps: int = 6
+    """Grasps tried in planning for one sequence."""
+
+
+class AgentLoop:
+    """Carries out one instruction after another with one robot and one set of agents."""
+
+    def __init__(self, robot: Robot, agents: Agents, log: EventLog, budget: Budget = Budget()) -> None:
+        self._robot = robot
+        self._agents = agents
+        self._log = log
+        self._budget = budget
+
+    def run(self, instruction: str) -> RunResult:
+        """Carry out an instruction; never raises a StageFailure. KeyboardInterrupt stops the arm and is raised on."""
+        run = _Run(self._robot, self._agents, self._log, self._budget, instruction)
+        try:
+            verdict, reason = run.until_the_end()
+        except BaseException:
+            self._robot.stop()
+            raise
+        with run.timed("execution"):
+            home = self._robot.go_home()
+        if not home.completed:
+            reason += f" The arm did not get home: {home.reason}"
+        return RunResult(instruction, verdict, reason, run.memory.records, dict(run.seconds))
+
+
+class _Run:
+    """The state of one run."""
+
+    def __init__(self, robot: Robot, agents: Agents, log: EventLog, budget: Budget, instruction: str) -> None:
+        self.robot, self.agents, self.log, self.budget, self.instruction = robot, agents, log, budget, instruction
+        self.memory = Memory()
+        self.seconds: defaultdict[str, float] = defaultdict(float)
+        self._start = time.monotonic()
+        self._turn = 0
+        self._failed_looks = 0
+        robot.on_move(lambda what, took: log.emit("move", turn=self._turn, description=what, seconds=took))
+
+    def until_the_end(self) -> tuple[RunVerdict, str]:
+        """Take turns until the agents are done, give up, or run out of budget."""
+        while self._turn < self.budget.turns:
+            self._turn += 1
+            if time.monotonic() - self._start > self.budget.seconds:
+                return RunVerdict.OUT_OF_BUDGET, f"The run took longer than its {self.budget.seconds:.0f} s."
+            try:
+                end = self._take_turn()
+                self._failed_looks = 0
+            except StageFailure as failure:
+                self.log.emit("failed", turn=self._turn, stage=str(failure.stage), reason=str(failure))
+                self._failed_looks += 1
+                if self._failed_looks >= self.budget.failed_looks:
+                    return RunVerdict.CANNOT, str(failure)
+                continue
+            if end is not None:
+                return end
+        return RunVerdict.OUT_OF_BUDGET, f"Not done after {self.budget.turns} turns."
+
+    def _take_turn(self) -> tuple[RunVerdict, str] | None:
+        """One turn; the verdict where it was the last. Raises StageFailure where nothing could be attempted."""
+        turn = self._turn
+        with self.timed("observe"):
+            observation = self.robot.observe()
+        self.log.emit("observed", turn=turn, observation=observation)
+        with self.timed("scene"):
+            scene = self.agents.scene.describe(self.instruction, observation)
+        self.log.emit("described", turn=turn, scene=scene)
+        with self.timed("reasoning"):
+            subtask = self.agents.reasoning.next_subtask(self.instruction, scene, self.memory)
+        self.memory.judge_last(subtask.previous, subtask.reason)
+        self.log.emit("reasoned", turn=turn, subtask=subtask)
+        if subtask.done:
+            return RunVerdict.ACHIEVED, subtask.reason
+        if subtask.cannot:
+            return RunVerdict.CANNOT, subtask.reason
+        self._attempt(subtask, observation)
+        return None
+
+    def _attempt(self, subtask: Subtask, observation: Observation) -> None:
+        """Try one sub-task; what came of it is in memory afterwards, failures before the first move included."""
+        located = Located((), ())
+        try:
+            with self.timed("detection"):
+                located = self.agents.objects.locate(subtask, observation, self.memory)
+            self.log.emit("located", turn=self._turn, objects=located.objects, detections=located.detections)
+            boxes = {info.index: info.box for info in (*located.objects, *located.surroundings)}
+            objects, keypoints = self._plan(subtask, located, boxes, Viewpoint.of(observation))
+        except CameraFailure:
+            raise
+        except StageFailure as failure:
+            self.log.emit("failed", turn=self._turn, stage=str(failure.stage), reason=str(failure))
+            report = ExecutionReport(completed=False, reached=0, reason=str(failure), stage=str(failure.stage))
+            self.memory.add(SubtaskRecord(subtask.text, located.objects, report, queries=subtask.objects))
+            return
+        with self.timed("execution"):
+            report = self.robot.execute(keypoints, boxes)
+            home = self.robot.go_home()
+        if report.completed and not home.completed:
+            report = home
+        self.log.emit("executed", turn=self._turn, report=report)
+        if not report.completed:
+            self.log.emit("failed", turn=self._turn, stage=report.stage, reason=report.reason)
+        self.memory.add(SubtaskRecord(subtask.text, objects, report, queries=subtask.objects))
+
+    def _plan(
+        self, subtask: Subtask, located: Located, boxes: Boxes, viewpoint: Viewpoint
+    ) -> tuple[tuple[ObjectInfo, ...], tuple[KeyPoint, ...]]:
+        """Key points that the robot accepts, and the objects with the grasps these use.
+
+        A sequence that doesn't bind or can't be moved goes back to the controller with the reason.
+        """
+        feedback = ""
+        for answers_left in reversed(range(self.budget.answers)):
+            with self.timed("control"):
+                sequence = self.agents.controller.write(subtask, located.objects, feedback)
+            try:
+                with self.timed("planning"):
+                    objects, keypoints = self._bind_and_check(sequence, located.objects, boxes, viewpoint)
+            except (FormatFailure, GraspFailure, MotionRejected) as failure:
+                feedback = str(failure)
+                if not answers_left:
+                    raise
+                self.log.emit("failed", turn=self._turn, stage=str(failure.stage), reason=feedback)
+            else:
+                self.log.emit("planned", turn=self._turn, sequence=sequence, keypoints=keypoints)
+                return objects, keypoints
+        raise FormatFailure(feedback)
+
+    def _bind_and_check(
+        self, sequence: ActionSequence, objects: Sequence[ObjectInfo], boxes: Boxes, viewpoint: Viewpoint
+    ) -> tuple[tuple[ObjectInfo, ...], tuple[KeyPoint, ...]]:
+        """Bind to the best grasps that the robot can reach; raises the first choice's rejection where none is."""
+        first_rejection: MotionRejected | None = None
+        for choice in _grasp_choices(objects, self.budget.grasps):
+            keypoints = bind(sequence, choice, viewpoint)
+            try:
+                self.robot.check(keypoints, boxes)
+            except MotionRejected as rejection:
+                first_rejection = first_rejection or rejection
+            else:
+                return choice, keypoints
+        raise first_rejection or MotionRejected("There is nothing to move.")
+
+    @contextmanager
+    def timed(self, stage: str) -> Iterator[None]:
+        """Add the time spent inside to a stage."""
+        start = time.monotonic()
+        try:
+            yield
+        finally:
+            self.seconds[stage] += time.monotonic() - start
+
+
+def _grasp_choices(objects: Sequence[ObjectInfo], limit: int) -> Iterator[tuple[ObjectInfo, ...]]:
+    """The objects as they are, then with the next grasps of the first one tried in turn (it is the one that moves)."""
+    yield tuple(objects)
+    if not objects:
+        return
+    first, rest = objects[0], tuple(objects[1:])
+    for k in range(1, min(limit, len(first.grasps))):
+        grasps = (first.grasps[k], *first.grasps[:k], *first.grasps[k + 1 :])
+        yield (replace(first, grasps=grasps), *rest)

@@ -1,0 +1,113 @@
+"""Objects for a command, without a model: segments, the lexicon's words on them, antipodal grasps."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import numpy as np
+
+from ...errors import FailureStage, GraspFailure
+from ...geometry import FloatArray
+from ...perception.grasps import GRIPPER, propose_grasps
+from ...perception.identity import find_again
+from ...perception.lexicon import Lexicon
+from ...perception.segmentation import TableView
+from ...perception.segments import Segment
+from ...perception.sight import Sight
+from ...perception.viewpoint import Viewpoint
+from ...types import Detection, GraspPose, Observation, Subtask, SubtaskRecord
+from ..memory import Memory
+from ..protocols import Located
+from .commands import Action, Command
+from .controller import direction_of
+from .language import parse_instruction
+
+REFIND = 0.10
+"""m around its last place within which a retry takes the thing it tried before to be the one meant."""
+
+
+class RulesObjectAgent:
+    """Grounds the queries of a sub-task; the first one is the object that moves and gets grasps."""
+
+    def __init__(self, sight: Sight, lexicon: Lexicon) -> None:
+        self._sight = sight
+        self._lexicon = lexicon
+
+    def locate(self, subtask: Subtask, observation: Observation, memory: Memory) -> Located:
+        """One object per query, in their order, and everything else as surroundings.
+
+        Raises
+        ------
+        DetectionFailure
+            Where a query can't be grounded, or several objects are equally good.
+        GraspFailure
+            Where the object that is to be moved offers no grasp.
+
+        """
+        view = self._sight.look(observation)
+        viewpoint = Viewpoint.of(observation)
+        attempts = memory.attempts(subtask.text)
+        chosen = [self._find(i, query, view, viewpoint, attempts) for i, query in enumerate(subtask.objects)]
+        command = parse_instruction(subtask.text)[0]
+        grasps = _grasps(view.segments[chosen[0]], view, command, viewpoint, attempts)
+        names = subtask.objects
+        objects = tuple(view.segments[k].to_object(i, names[i], grasps if i == 0 else ()) for i, k in enumerate(chosen))
+        others = [k for k in range(len(view.segments)) if k not in chosen]
+        surroundings = tuple(
+            view.segments[k].to_object(i, self._lexicon.name(view.segments[k]))
+            for i, k in enumerate(others, len(chosen))
+        )
+        detections = tuple(
+            _detection(view.segments[k], query, observation) for k, query in zip(chosen, names, strict=True)
+        )
+        return Located(objects, detections, surroundings)
+
+    def _find(
+        self, i: int, query: str, view: TableView, viewpoint: Viewpoint, attempts: Sequence[SubtaskRecord]
+    ) -> int:
+        """Index of the segment a query means; on a retry, the thing that was tried before, wherever it went."""
+        for record in reversed(attempts):
+            if len(record.objects) > i:
+                now = [segment.to_object(k, query) for k, segment in enumerate(view.segments)]
+                again = find_again(record.objects[i], now, REFIND)
+                if again is not None:
+                    return again.index
+                break
+        return self._lexicon.ground(query, view.segments, viewpoint)
+
+
+def _grasps(
+    segment: Segment, view: TableView, command: Command, viewpoint: Viewpoint, attempts: Sequence[SubtaskRecord]
+) -> tuple[GraspPose, ...]:
+    """The object's grasps, best first; each attempt that failed to hold it moves on to the next."""
+    grasps = propose_grasps(segment, view.height_map)
+    if not grasps:
+        width = segment.extent[1]
+        why = f"it is {width * 100:.1f} cm wide, the gripper opens {GRIPPER.max_opening * 100:.1f} cm"
+        if width + 0.006 < GRIPPER.max_opening:
+            why = "it lies too flat, or other things are in the way"
+        raise GraspFailure(f"No grasp was found for the {command.object}: {why}.")
+    if command.action in (Action.DRAG, Action.PUSH):
+        grasps = _leading_first(grasps, segment, direction_of(command, segment.centre[:2], viewpoint))
+    slipped = sum(record.outcome.stage == FailureStage.GRASP for record in attempts) % len(grasps)
+    return grasps[slipped:] + grasps[:slipped]
+
+
+def _leading_first(grasps: tuple[GraspPose, ...], segment: Segment, direction: FloatArray) -> tuple[GraspPose, ...]:
+    """Grasps on the side towards which it is dragged come first: what is pulled trails, what is pushed turns."""
+
+    def lead(grasp: GraspPose) -> float:
+        offset = grasp.T_base_grasp[:2, 3] - segment.centre[:2]
+        return float(offset @ direction) / max(float(np.linalg.norm(offset)), 1e-3)
+
+    return tuple(sorted(grasps, key=lambda grasp: -(grasp.score + 0.5 * lead(grasp))))
+
+
+def _detection(segment: Segment, query: str, observation: Observation) -> Detection:
+    """Where a segment is in the main view."""
+    mask = segment.masks.get(observation.main)
+    if mask is None or not mask.any():
+        return Detection(query, (0.0, 0.0, 0.0, 0.0), 1.0, observation.main)
+    rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
+    box = (float(columns[0]), float(rows[0]), float(columns[-1]), float(rows[-1]))
+    return Detection(query, box, 1.0, observation.main, mask)

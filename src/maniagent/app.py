@@ -1,0 +1,93 @@
+"""One run from end to end: the twin, the robot, the agents, the recorder. What the command line and Python call."""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from contextlib import ExitStack
+from dataclasses import dataclass
+from pathlib import Path
+
+import numpy as np
+
+from .agents.events import EventLog, Observer
+from .agents.loop import AgentLoop
+from .agents.rules import rules_agents
+from .console.recorder import Recorder
+from .envs.tabletop import TabletopEnv
+from .errors import UsageError
+from .robots.simulated import SimulatedRobot
+from .tasks import Episode, Task, get, load_task
+from .types import RunResult
+
+
+@dataclass(frozen=True)
+class RunOutcome:
+    """What a run came to: what the agents believe, and what is true."""
+
+    task: str | None
+    seed: int
+    instruction: str
+    result: RunResult
+    achieved: bool | None
+    """By the task's or scene file's own predicate on the true state, whatever the instruction; None without one."""
+    out: Path | None
+
+
+def run(
+    instruction: str | None = None,
+    *,
+    task: str | None = None,
+    scene: str | Path | None = None,
+    seed: int = 0,
+    out: str | Path | None = None,
+    view: bool = False,
+    observers: Sequence[Observer] = (),
+) -> RunOutcome:
+    """Carry out an instruction in the tabletop twin with the `rules` agents.
+
+    Give a task by name, or a scene file (docs/scenes.md). Without an instruction the task's own is carried out.
+    `seed` draws the layout and the sensors' noise: the same seed gives the same run. With `out` the run leaves a
+    folder with log, pictures, video and report. `view` opens MuJoCo's viewer.
+
+    Raises
+    ------
+    UsageError
+        For an unknown task, a bad scene file, or nothing to do.
+    SetupError
+        Where nothing renders offscreen.
+
+    """
+    chosen = _choose(task, scene)
+    name = chosen.name if task is not None else None
+    folder = Path(out) if out is not None else None
+    with ExitStack() as stack:
+        env = TabletopEnv(chosen.scene, render_mode="human" if view else "rgb_array")
+        stack.callback(env.close)
+        env.reset(seed=seed)
+        episode = chosen.episode(env.layout, np.random.default_rng([seed, 1]))
+        said = (episode.instruction if instruction is None else instruction).strip()
+        if not said:
+            raise UsageError("There is no instruction: say one, or write one into the scene file.")
+        recorders = [] if folder is None else [stack.enter_context(Recorder(folder))]
+        log = EventLog([*recorders, *observers])
+        result, achieved = _carry_out(env, episode, said, name, seed, log)
+    return RunOutcome(name, seed, said, result, achieved, folder)
+
+
+def _choose(task: str | None, scene: str | Path | None) -> Task:
+    if (task is None) == (scene is None):
+        raise UsageError("Give either a task (`maniagent tasks` lists them) or a scene file, and not both.")
+    return get(task) if task is not None else load_task(Path(str(scene)))
+
+
+def _carry_out(
+    env: TabletopEnv, episode: Episode, instruction: str, task: str | None, seed: int, log: EventLog
+) -> tuple[RunResult, bool | None]:
+    """Run the loop; what is true is looked at only when the agents are through."""
+    robot = SimulatedRobot(env, on_frame=lambda rgb, at: log.emit("frame", rgb=rgb, robot_time=at))
+    agents = rules_agents(robot.covers)
+    log.emit("run_started", instruction=instruction, task=task, seed=seed, agents=agents.name)
+    result = AgentLoop(robot, agents, log).run(instruction)
+    achieved = episode.achieved(env.truth())
+    log.emit("run_finished", result=result, achieved=achieved)
+    return result, achieved

@@ -1,0 +1,42 @@
+"""Recognising a thing that was seen before, by its looks and size: names change when things are moved.
+
+"The pepper in the middle" is another one once the first is on the plate.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+
+import cv2
+import numpy as np
+
+from ..geometry import FloatArray
+from ..types import ObjectInfo
+
+MAX_COLOUR_DISTANCE = 40.0
+"""CIE Lab distance (8-bit scale, lightness halved) between two looks at one thing, in light and in shade."""
+MAX_SIZE_RATIO = 1.6
+"""Between two estimates of one thing's length: part of it may be hidden."""
+
+
+def same_thing(before: ObjectInfo, now: ObjectInfo) -> bool:
+    """Whether two objects look alike: by colour, and by the longer horizontal side."""
+    colour = float(np.linalg.norm(_lab(before.colour) - _lab(now.colour)))
+    lengths = sorted((float(before.extent[0]), float(now.extent[0])))
+    return colour < MAX_COLOUR_DISTANCE and lengths[1] < MAX_SIZE_RATIO * max(lengths[0], 1e-3)
+
+
+def find_again(before: ObjectInfo, now: Sequence[ObjectInfo], within: float) -> ObjectInfo | None:
+    """The object that looks like `before` and is nearest to where that was, `within` m of it; None without one."""
+    alike = [thing for thing in now if same_thing(before, thing)]
+    nearest = min(alike, key=lambda thing: _distance(before, thing), default=None)
+    return nearest if nearest is not None and _distance(before, nearest) <= within else None
+
+
+def _distance(a: ObjectInfo, b: ObjectInfo) -> float:
+    return float(np.linalg.norm(a.centre[:2] - b.centre[:2]))
+
+
+def _lab(rgb: tuple[int, int, int]) -> FloatArray:
+    lab = cv2.cvtColor(np.array([[rgb]], np.uint8), cv2.COLOR_RGB2LAB)[0, 0].astype(float)
+    return lab * [0.5, 1.0, 1.0]
