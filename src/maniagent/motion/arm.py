@@ -53,10 +53,7 @@ class Arm(Protocol):
         """The latest reading of the servos; NaN where a servo doesn't answer."""
 
     def command(self, joint_positions: FloatArray, gripper_opening: float) -> None:
-        """Track `joint_positions` ((6,) rad) and `gripper_opening` (m) for one control period.
-
-        An opening below the closed gap presses the fingers together with the gripper's full force.
-        """
+        """Track `joint_positions` ((6,) rad) and `gripper_opening` (m between the pads) for one control period."""
 
     def stop(self) -> None:
         """Hold the joints where they are now; the gripper keeps its last command. Safe to call at any time."""

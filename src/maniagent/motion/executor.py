@@ -16,9 +16,6 @@ from .kinematics import ArmModel
 from .plan import PlannedMove
 from .watch import TrackingWatch, WatchSettings
 
-_SQUEEZE = 0.0
-"""m, opening commanded to close: below the closed gap, so that the fingers press with all their force."""
-
 OnTick = Callable[[ArmState], None]
 OnMove = Callable[[str, float], None]
 
@@ -99,7 +96,7 @@ class _Run:
             raise StageFailure("The arm was not moved: a servo reads no valid position.")
         self._watch = TrackingWatch(model, settings.watch, self._state.joint_positions, arm.period)
         pressing = self._state.gripper_effort > settings.held_effort
-        self._opening_command = _SQUEEZE if pressing else self._state.gripper_opening
+        self._opening_command = model.min_opening if pressing else self._state.gripper_opening
         self._empty_for = 0.0
 
     def carry_out(self, move: PlannedMove) -> None:
@@ -108,7 +105,7 @@ class _Run:
         if np.abs(self._state.joint_positions - trajectory.start).max() > self._settings.start_tolerance:
             raise StageFailure(f"The arm is not where {move.description!r} starts; it was moved from outside.")
         if move.held is not None:
-            self._opening_command = _SQUEEZE
+            self._opening_command = self._model.min_opening
         ticks = int(np.ceil(trajectory.duration / self._arm.period))
         for tick in range(1, ticks + 1):
             self._tick(trajectory.sample(tick * self._arm.period), move)
@@ -151,7 +148,7 @@ class _Run:
 
     def _close(self, move: PlannedMove) -> None:
         """Close with full force; where something has to be held after that, make sure of it."""
-        self._move_fingers(_SQUEEZE, move)
+        self._move_fingers(self._model.min_opening, move)
         if move.grasps is not None and not self._holds():
             raise GraspFailure(f"The fingers closed on nothing after {move.description!r}.")
 
