@@ -28,6 +28,8 @@ if [ -n "${MUJOCO_GL:-}" ] || [ "$(id -u)" -ne 0 ] || ! command -v apt-get >/dev
 fi
 echo "Nothing draws camera images here: installing Mesa's software renderer."
 export DEBIAN_FRONTEND=noninteractive
+packages=$("$python" -c 'from maniagent.envs.rendering import PACKAGES; print(*PACKAGES["egl"])')
 apt-get update -qq
-apt-get install -y -qq --no-install-recommends libegl1 libgl1-mesa-dri
+# shellcheck disable=SC2086  # one word a package
+apt-get install -y -qq --no-install-recommends $packages >/dev/null
 ask

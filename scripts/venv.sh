@@ -22,7 +22,7 @@ if ! python=$(find_python); then
         echo "No Python 3.11 or newer: installing Debian's."
         export DEBIAN_FRONTEND=noninteractive
         apt-get update -qq
-        apt-get install -y -qq --no-install-recommends python3 python3-venv
+        apt-get install -y -qq --no-install-recommends python3 python3-venv >/dev/null
     fi
     if ! python=$(find_python); then
         echo "maniagent needs Python 3.11 or newer. Install one (on Debian 12, Ubuntu 24.04 and later:" >&2
@@ -39,7 +39,7 @@ if ! "$python" -c 'import ensurepip, venv' 2>/dev/null; then
         echo "Installing $package."
         export DEBIAN_FRONTEND=noninteractive
         apt-get update -qq
-        apt-get install -y -qq --no-install-recommends "$package"
+        apt-get install -y -qq --no-install-recommends "$package" >/dev/null
     else
         echo "Python's venv module is missing. Install it, then try again:" >&2
         echo "  sudo apt-get install -y $package" >&2

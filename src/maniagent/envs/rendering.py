@@ -19,8 +19,8 @@ from ..errors import SetupError
 OFFSCREEN = ("egl", "osmesa")
 """Offscreen back-ends, the faster first."""
 
-PACKAGES = {"egl": ("libegl1", "libgl1-mesa-dri"), "osmesa": ("libosmesa6",)}
-"""Debian and Ubuntu packages that let each back-end draw without a GPU."""
+PACKAGES = {"egl": ("libegl1", "libopengl0", "libgl1-mesa-dri"), "osmesa": ("libosmesa6",)}
+"""Debian and Ubuntu packages that let each back-end draw without a GPU; libegl1 alone brings no OpenGL library."""
 
 PROBE_SECONDS = 120.0
 """A probe takes about a second on an idle machine; one that takes this long hangs in a driver."""
