@@ -12,6 +12,9 @@ from hypothesis import strategies as st
 
 from maniagent.envs.objects import ObjectModel, attach, make_object, object_names
 from maniagent.envs.objects.bodies import COLLISION_GROUP, VISUAL_GROUP
+from maniagent.envs.objects.implicit import ball, limb, slab
+from maniagent.envs.objects.mesh import merge
+from maniagent.envs.objects.pieces import Piece
 from maniagent.envs.objects.things import BLOCK_COLOURS
 from maniagent.errors import UnknownNameError, UsageError
 from maniagent.geometry import FloatArray
@@ -108,6 +111,22 @@ def bounds_of(parts: list[tuple[FloatArray, FloatArray]]) -> tuple[FloatArray, F
     return np.min([low for low, _ in parts], axis=0), np.max([high for _, high in parts], axis=0)
 
 
+def distance_to(piece: Piece, points: FloatArray) -> FloatArray:
+    """Signed distance (N,) of points (N, 3) from a piece's surface, m, negative inside."""
+    local = (points - piece.centre) @ piece.rotation
+    radius, half_length, _ = piece.size
+    match piece.shape:
+        case mujoco.mjtGeom.mjGEOM_BOX:
+            return slab(2 * piece.size, (0, 0, 0), 0.0)(local)
+        case mujoco.mjtGeom.mjGEOM_ELLIPSOID:
+            return ball(2 * piece.size, (0, 0, 0))(local)
+        case mujoco.mjtGeom.mjGEOM_CAPSULE:
+            return limb((0, 0, -half_length), (0, 0, half_length), radius, radius)(local)
+        case _:
+            away = np.column_stack([np.hypot(local[:, 0], local[:, 1]) - radius, np.abs(local[:, 2]) - half_length])
+            return np.linalg.norm(np.maximum(away, 0), axis=1) + np.minimum(away.max(axis=1), 0)
+
+
 @pytest.fixture(params=object_names())
 def model(request: pytest.FixtureRequest) -> ObjectModel:
     return make_object(request.param)
@@ -126,6 +145,16 @@ def test_what_is_felt_has_the_extent_of_what_is_seen(model: ObjectModel) -> None
     seen = np.array(bounds_of([visual.mesh.bounds for visual in model.visuals]))
     felt = np.array(bounds_of([piece.bounds for piece in model.pieces]))
     np.testing.assert_allclose(felt, seen, atol=0.0025)
+
+
+def test_hardly_anything_that_is_seen_sticks_out_of_what_is_felt(model: ObjectModel) -> None:
+    mesh = merge([visual.mesh for visual in model.visuals])
+    corners = mesh.vertices[mesh.faces]
+    area = np.linalg.norm(np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0]), axis=1)
+    outside = np.min([distance_to(piece, corners.mean(axis=1)) for piece in model.pieces], axis=0)
+    assert area[outside > 0.003].sum() < 0.06 * area.sum()
+    assert area[outside > 0.006].sum() == 0.0
+    assert abs(np.median(outside)) < 0.001
 
 
 def test_the_long_axis_is_x(model: ObjectModel) -> None:
@@ -206,6 +235,21 @@ def test_things_laid_on_it_rest_at_its_surface(kind: str) -> None:
     data.joint("thing1").qpos[:3] = [0.0, 0.0, below.surface_z + above.rest_z + 0.005]
     mujoco.mj_step(compiled, data, 500)
     assert data.body("thing1").xpos[2] - above.rest_z == pytest.approx(below.surface_z, abs=0.002)
+
+
+@pytest.mark.parametrize(
+    ("below", "above"),
+    [("towel", "fork"), ("towel", "knife"), ("towel", "spoon"), ("plate", "egg"), ("plate", "carrot"), ("dish", "egg")],
+)
+def test_what_is_dropped_from_two_centimetres_lies_where_it_fell(below: str, above: str) -> None:
+    base, thing = make_object(below), make_object(above)
+    compiled = scene(base, thing)
+    data = mujoco.MjData(compiled)
+    target = np.array([0.0, 0.0, base.surface_z + thing.rest_z])
+    data.joint("thing1").qpos[:3] = target + [0.0, 0.0, 0.02]
+    mujoco.mj_step(compiled, data, 1000)
+    assert np.linalg.norm(data.body("thing1").xpos - target) < 0.002
+    assert data.body("thing1").xmat[8] > np.cos(np.radians(2.0))
 
 
 def test_a_marker_laid_into_the_palm_stays_there() -> None:

@@ -12,6 +12,12 @@ VISUAL_GROUP = 1
 COLLISION_GROUP = 3
 """Geom groups: cameras draw groups 0 to 2, so collision pieces stay unseen."""
 
+SOLREF = (0.005, 1.0)
+"""Time constant (s) and damping ratio of contacts: stiff, because a light thin thing (a fork's tines) that lands
+must not sink through half its thickness, beyond which it would be pushed out on the wrong side."""
+SOLMIX = 50.0
+"""Weight of `SOLREF` against the softer default of a table."""
+
 
 def attach(spec: mujoco.MjSpec, model: ObjectModel, name: str) -> None:
     """Add `model` to the scene as a body `name` with a free joint `name`, upright at rest on z = 0, x and y 0.
@@ -29,15 +35,14 @@ def attach(spec: mujoco.MjSpec, model: ObjectModel, name: str) -> None:
 
 def _add_visual(spec: mujoco.MjSpec, body: mujoco.MjsBody, visual: Visual, name: str) -> None:
     mesh, finish = visual.mesh, visual.finish
-    corners = np.hstack([mesh.vertices[mesh.faces.ravel()], mesh.normals().reshape(-1, 3)])
-    points, face = np.unique(np.round(corners, 7), axis=0, return_inverse=True)  # MuJoCo wants one normal a vertex
+    vertices, normals, faces = mesh.with_normals  # MuJoCo 4.0 overlooks `userfacenormal`: one normal a vertex
     spec.add_mesh(
         name=name,
-        uservert=points[:, :3].ravel(),
-        usernormal=points[:, 3:].ravel(),
-        userface=face.ravel(),
+        uservert=vertices.ravel(),
+        usernormal=normals.ravel(),
+        userface=faces.ravel(),
         usertexcoord=mesh.uv.ravel(),
-        userfacetexcoord=np.arange(mesh.faces.size),
+        userfacetexcoord=np.arange(faces.size),
         inertia=mujoco.mjtMeshInertia.mjMESH_INERTIA_SHELL,  # parts are thin, and weigh nothing here
     )
     material = spec.add_material(
@@ -80,4 +85,6 @@ def _add_piece(body: mujoco.MjsBody, piece: Piece, model: ObjectModel, mass: flo
         condim=6,
         friction=[contact.sliding, contact.torsional, contact.rolling],
         priority=contact.priority,
+        solref=SOLREF,
+        solmix=SOLMIX,
     )

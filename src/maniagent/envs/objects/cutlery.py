@@ -31,7 +31,7 @@ def spoon() -> ObjectModel:
         "spoon",
         "spoon",
         [Visual(merge([_handle(0.018, 0.034), bowl]), STEEL)],
-        [*_handle_pieces(0.018, 0.034), ellipsoid_piece((length, width, 0.0076), (bowl_x, 0, 0.0038))],
+        [*_handle_pieces(0.018, 0.034), ellipsoid_piece((length, width, 0.0054), (bowl_x, 0, 0.0027))],
         mass=0.035,
         contact=CUTLERY,
     )

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import numpy as np
 from numpy.typing import ArrayLike, NDArray
@@ -79,6 +80,13 @@ class Mesh:
         close = (around >= 0) & (np.einsum("kj,kvj->kv", unit[own], unit[around]) > np.cos(CREASE))
         summed = np.einsum("kv,kvj->kj", close.astype(float), weighted[around])
         return (summed / np.linalg.norm(summed, axis=1, keepdims=True)).reshape(-1, 3, 3)
+
+    @cached_property
+    def with_normals(self) -> tuple[FloatArray, FloatArray, IntArray]:
+        """Vertices (K, 3), their unit normals (K, 3) and faces (M, 3): vertices on sharp edges are there repeatedly."""
+        corners = np.hstack([self.vertices[self.faces.ravel()], self.normals().reshape(-1, 3)])
+        points, faces = np.unique(np.round(corners, 7), axis=0, return_inverse=True)
+        return points[:, :3], points[:, 3:], faces.reshape(-1, 3)
 
 
 def merge(meshes: Sequence[Mesh]) -> Mesh:

@@ -24,6 +24,11 @@ def bow(length: float, sagitta: float, count: int = 24) -> FloatArray:
     return np.column_stack([x, sagitta * (1.0 - (2.0 * x / length) ** 2)])
 
 
+def straight(start: float, length: float, at: FloatArray) -> FloatArray:
+    """Points (count, 2) on the x axis, at the places `at` (count,) in [0, 1] of the way from `start`."""
+    return np.column_stack([start + length * at, np.zeros_like(at)])
+
+
 def stations(count: int) -> FloatArray:
     """(count,) places from 0 to 1, denser at both ends, where bodies round off."""
     return 0.5 - 0.5 * np.cos(np.linspace(0.0, np.pi, count))
@@ -55,11 +60,11 @@ def lying(xy: FloatArray, radius: FloatArray, *, sides: int = 20) -> Mesh:
     return sweep(np.column_stack([xy, radius - FLAT]), radius, sides=sides).cut_below(0.0)
 
 
-def capsules_along(xy: FloatArray, radius: FloatArray, count: int, axis_z: float | None = None) -> list[Piece]:
-    """`count` level capsules that fill a round body along `xy` (R, 2) with `radius` (R,).
+def capsules_along(xy: FloatArray, radius: FloatArray, edges: ArrayLike, axis_z: float | None = None) -> list[Piece]:
+    """Level capsules that fill a round body along `xy` (R, 2) with `radius` (R,), one between each two `edges`.
 
-    Their axes are at height `axis_z`, their undersides just above the table: the body rests on another piece, its
-    flat. Without it each lies on z = 0.
+    `edges` are shares of the body's length, from 0 to 1. With `axis_z` the axes are at that height and the undersides
+    just above the table: the body rests on another piece, its flat. Without it each capsule lies on z = 0.
     """
     steps = np.linalg.norm(np.diff(xy, axis=0), axis=1)
     s = np.concatenate([[0.0], np.cumsum(steps)])
@@ -67,13 +72,13 @@ def capsules_along(xy: FloatArray, radius: FloatArray, count: int, axis_z: float
     def point(at: float) -> FloatArray:
         return np.array([np.interp(at, s, xy[:, 0]), np.interp(at, s, xy[:, 1])])
 
-    edges = np.linspace(0.0, s[-1], count + 1)
+    pairs = list(pairwise(np.asarray(edges, float) * s[-1]))
     pieces = []
-    for index, (low, high) in enumerate(pairwise(edges)):
+    for index, (low, high) in enumerate(pairs):
         r = float(np.interp((low + high) / 2, s, radius)) - FLAT / 2
         if axis_z is not None:
             r = min(r, axis_z - FLAT / 4)
-        start, end = (low + r if index == 0 else low), (high - r if index == count - 1 else high)
+        start, end = (low + r if index == 0 else low), (high - r if index == len(pairs) - 1 else high)
         if end - start < STUB:  # the end of a thick body: all but a sphere
             start, end = (start, start + STUB) if index == 0 else (end - STUB, end)
         z = r if axis_z is None else axis_z
