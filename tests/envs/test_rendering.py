@@ -44,7 +44,9 @@ def test_a_broken_egl_falls_through_to_osmesa(probes: dict[str, str]) -> None:
 
 
 def test_where_nothing_draws_the_error_holds_the_line_that_mends_it(probes: dict[str, str]) -> None:
-    with pytest.raises(SetupError, match="apt-get install -y --no-install-recommends libegl1 libopengl0 libgl1-mesa-dri"):
+    with pytest.raises(
+        SetupError, match="apt-get install -y --no-install-recommends libegl1 libopengl0 libgl1-mesa-dri"
+    ):
         rendering.ensure_gl()
     assert not os.environ["MUJOCO_GL"]
 
