@@ -246,7 +246,7 @@ def test_what_is_dropped_from_two_centimetres_lies_where_it_fell(below: str, abo
     compiled = scene(base, thing)
     data = mujoco.MjData(compiled)
     target = np.array([0.0, 0.0, base.surface_z + thing.rest_z])
-    data.joint("thing1").qpos[:3] = target + [0.0, 0.0, 0.02]
+    data.joint("thing1").qpos[:3] = target + np.array([0.0, 0.0, 0.02])
     mujoco.mj_step(compiled, data, 1000)
     assert np.linalg.norm(data.body("thing1").xpos - target) < 0.002
     assert data.body("thing1").xmat[8] > np.cos(np.radians(2.0))
