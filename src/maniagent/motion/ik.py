@@ -20,6 +20,8 @@ POSITION_TOLERANCE = 2e-4
 ROTATION_TOLERANCE = 1.7e-3
 """rad; a fifth of the half degree that is promised."""
 
+_AT_LIMIT = 1e-5
+"""rad."""
 _MAX_STEPS = 15
 _RESTARTS = 8
 
@@ -59,9 +61,14 @@ class IKSolver:
         if self._dimensions.missing_reach(T_base_tcp) > 0.02 or not np.isfinite(T_base_tcp).all():
             return []
         seeds = list(postures(self._dimensions, T_base_tcp, roll_if_free=near[3]))
-        exact = [q for q in seeds if self._allowed(q) and self._reaches(q, T_base_tcp)]
+        exact = [q for q in map(self._snapped, seeds) if self._allowed(q) and self._reaches(q, T_base_tcp)]
         found = exact or self._refined(T_base_tcp, seeds, near)
         return sorted(found, key=lambda q: _distance(q, near))
+
+    def _snapped(self, q: FloatArray) -> FloatArray:
+        """The same posture, moved to the limit where it lies beyond by no more than rounding errors."""
+        inside = np.clip(q, self.model.lower + self.joint_margin, self.model.upper - self.joint_margin)
+        return np.where(np.abs(inside - q) < _AT_LIMIT, inside, q)
 
     def _allowed(self, q: FloatArray) -> bool:
         return self.model.within_limits(q, self.joint_margin)

@@ -28,6 +28,8 @@ class MotionLimits(BaseModel):
     """m, base frame: upper corner."""
     tcp_speed: Positive = 0.25
     """m/s, fastest motion of the TCP."""
+    contact_speed: Positive = 0.12
+    """m/s, of moves that may touch an object; above `tcp_speed` it changes nothing."""
     joint_margin: Annotated[float, Field(ge=0, le=0.5)] = 0.01
     """rad, kept free at both ends of every joint's range."""
     joint_speed_share: Annotated[float, Field(gt=0, le=1)] = 0.5

@@ -74,7 +74,8 @@ class MoveFinder:
         """The straight line of the TCP to a pose; raises MotionRejected where it isn't free."""
         path = tcp_line(self.solver, start, T_base_goal)
         self._require_free(path, rules)
-        return time_path(path, self.model, self.limits)
+        speed = self.limits.contact_speed if rules.touches else self.limits.tcp_speed
+        return time_path(path, self.model, self.limits, speed)
 
     def free(self, start: FloatArray, goals: Sequence[FloatArray], rules: MoveRules) -> JointTrajectory:
         """Straight in joint space, else by sampling, to the first posture of `goals` ((6,) rad) that is reached.

@@ -72,12 +72,12 @@ class JointTrajectory:
         )
 
 
-def time_path(path: JointPath, model: ArmModel, limits: MotionLimits) -> JointTrajectory:
+def time_path(path: JointPath, model: ArmModel, limits: MotionLimits, tcp_speed: float = np.inf) -> JointTrajectory:
     """The fastest rest-to-rest motion along a path whose path speed has constant limits.
 
     The limits of joints and TCP become limits on s: with q(s), joint velocity is q' s', joint acceleration is
     q'' s'^2 + q' s''. Half the acceleration is left to each of the two terms. ruckig (Berscheid & Kröger 2021)
-    then gives the time-optimal jerk-limited s(t).
+    then gives the time-optimal jerk-limited s(t). `tcp_speed` (m/s) slows the TCP down further.
     """
     s = np.linspace(0.0, 1.0, 25)
     q, dq, ddq = path.at(s), path.at(s, 1), path.at(s, 2)
@@ -86,7 +86,7 @@ def time_path(path: JointPath, model: ArmModel, limits: MotionLimits) -> JointTr
     tcp_rate = max(float(np.linalg.norm((model.jacobian(qi) @ dqi)[:3])) for qi, dqi in zip(q, dq, strict=True))
     joint_rate = float((np.abs(dq) / (limits.joint_speed_share * model.velocity_limit)).max())
     bend, slope = float(np.abs(ddq).max()), float(np.abs(dq).max())
-    speed = min(limits.tcp_speed / max(tcp_rate, 1e-9), 1.0 / joint_rate)
+    speed = min(min(tcp_speed, limits.tcp_speed) / max(tcp_rate, 1e-9), 1.0 / joint_rate)
     if bend > 1e-9:
         speed = min(speed, float(np.sqrt(0.5 * limits.joint_acceleration / bend)))
     share = 0.5 if bend * speed**2 > 0.05 * limits.joint_acceleration else 0.95

@@ -17,11 +17,11 @@ class WatchSettings:
 
     servo_lag: float = 0.06
     """s: how far a freely moving arm follows behind its set-points."""
-    tcp_deviation: float = 0.012
+    tcp_deviation: float = 0.008
     """m: between the TCP and where a free arm's would be."""
     joint_deviation: float = 0.12
     """rad, likewise; catches a blocked wrist, which hardly moves the TCP."""
-    patience: float = 0.08
+    patience: float = 0.04
     """s that a deviation lasts before it counts."""
 
 
