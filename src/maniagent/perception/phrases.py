@@ -7,7 +7,7 @@ in lower case without hyphens; sides are the viewer's (see `viewpoint`).
 from __future__ import annotations
 
 import enum
-from collections.abc import Mapping, Sequence
+from collections.abc import Iterator, Mapping, Sequence
 from itertools import product
 from typing import Generic, TypeVar
 
@@ -60,6 +60,21 @@ class PhraseTable(Generic[T]):
             if phrase in self._meanings:
                 return self._meanings[phrase], count
         return None
+
+
+def scan(table: PhraseTable[T], words: Sequence[str]) -> Iterator[tuple[tuple[str, ...], T | None]]:
+    """`words` cut into known phrases with their meaning, and single other words with None.
+
+    "On the left" is a position at the end of a noun phrase; in "on the left plate" it is "on", and a plate.
+    """
+    start = 0
+    while start < len(words):
+        meaning, count = table.match(words, start) or (None, 1)
+        noun_follows = start + count < len(words) and not table.match(words, start + count)
+        if isinstance(meaning, Pick) and noun_follows:
+            meaning, count = table.match(words[: start + 1], start) or (None, 1)
+        yield tuple(words[start : start + count]), meaning
+        start += count
 
 
 def spelt(text: str, meaning: T) -> dict[str, T]:

@@ -11,10 +11,10 @@ import math
 from collections.abc import Iterator, Sequence
 from dataclasses import dataclass
 
-from ...perception.phrases import Pick, Where
+from ...perception.phrases import POSITIONS, PhraseTable, Where, scan
 from .clauses import clauses, joins
 from .commands import Action, Command, Direction, Relation
-from .nouns import DETERMINERS, GOALS, PRONOUNS, Mark, noun_phrase, scan
+from .nouns import DETERMINERS, GOALS, PHRASES, PRONOUNS, Mark, noun_phrase
 from .refusals import NeedsLanguageModel, UnclearInstruction, quote, refuse_what_needs_judgement
 from .tokens import Kind, Token, tokenize
 from .vocabulary import BEFORE_POINT, DIRECTIONS, SENSES, TABLE, VERBS
@@ -22,6 +22,7 @@ from .vocabulary import BEFORE_POINT, DIRECTIONS, SENSES, TABLE, VERBS
 __all__ = ["Command", "NeedsLanguageModel", "UnclearInstruction", "parse_instruction"]
 
 MAX_COMMANDS = 20
+_POSITIONS = PhraseTable(POSITIONS)
 
 
 @dataclass(frozen=True)
@@ -230,7 +231,8 @@ def _read_relation(words: list[str], action: Action) -> tuple[list[str], _Goal |
 def _refuse_bare_direction(words: Sequence[str], action: Action) -> None:
     """Raise for "push the plate to the left", but not for "push the plate on the left"."""
     direction = DIRECTIONS.match_end(words)
-    describes = any(isinstance(meaning, Pick) and phrase[0] != "to" for phrase, meaning in list(scan(words))[-1:])
+    position = _POSITIONS.match_end(words)
+    describes = position is not None and words[-position[1]] != "to"
     if direction and not describes and action is not Action.PICK_UP:
         raise UnclearInstruction(f"{quote(words)}: how far? Say for example '{direction[0]} by 10 cm'.")
 
@@ -240,7 +242,7 @@ def _find_goal(words: Sequence[str], action: Action) -> tuple[int, int, Relation
     goals: list[tuple[int, int, Relation]] = []
     places: list[tuple[int, int, Relation]] = []
     start, described = 0, False
-    for phrase, meaning in scan(words):
+    for phrase, meaning in scan(PHRASES, words):
         if meaning in GOALS:
             goals.append((start, len(phrase), _as_goal(meaning, action)))
         elif isinstance(meaning, Where) and meaning not in (Where.CLOSEST, Where.FARTHEST) and not described:

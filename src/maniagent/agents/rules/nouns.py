@@ -7,10 +7,10 @@ phrase means on the table is the lexicon's to say; here it is only made sure tha
 from __future__ import annotations
 
 import enum
-from collections.abc import Iterator, Sequence
+from collections.abc import Sequence
 from itertools import product
 
-from ...perception.phrases import COUNTED_FROM, POSITIONS, RELATIONS, PhraseTable, Pick, Where, spelt
+from ...perception.phrases import COUNTED_FROM, POSITIONS, RELATIONS, PhraseTable, Pick, Where, scan, spelt
 from .refusals import NeedsLanguageModel, UnclearInstruction, quote, refuse_what_names_no_object
 
 
@@ -70,21 +70,6 @@ _LONGEST = 160
 _SAID_AS: dict[Meaning, str] = {Mark.ONTO: "on", Mark.INTO: "in", Mark.OFF: "on", Mark.OUT_OF: "in"}
 
 
-def scan(words: Sequence[str]) -> Iterator[tuple[tuple[str, ...], Meaning | None]]:
-    """`words` cut into phrases with their meaning, and single other words with None.
-
-    "On the left" is a position at the end of a phrase; in "on the left plate" it is "on" and a plate.
-    """
-    start = 0
-    while start < len(words):
-        meaning, count = PHRASES.match(words, start) or (None, 1)
-        noun_follows = start + count < len(words) and not PHRASES.match(words, start + count)
-        if isinstance(meaning, Pick) and noun_follows:
-            meaning, count = PHRASES.match(words[: start + 1], start) or (None, 1)
-        yield tuple(words[start : start + count]), meaning
-        start += count
-
-
 def noun_phrase(words: Sequence[str]) -> str:
     """The canonical spelling of a noun phrase, without its article.
 
@@ -94,7 +79,7 @@ def noun_phrase(words: Sequence[str]) -> str:
     refuse_what_names_no_object(words)
     said: list[str] = ["any"] if list(words[:1]) == ["any"] or list(words[:3]) == ["one", "of", "the"] else []
     named, after = False, None
-    for phrase, meaning in scan(_without_article(words)):
+    for phrase, meaning in scan(PHRASES, _without_article(words)):
         if isinstance(meaning, Pick) and named:
             said += phrase
         elif meaning is Mark.RELATIVE and named and after is None:
