@@ -11,7 +11,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from . import __version__
-from .errors import ManiAgentError, UsageError
+from .errors import ManiAgentError
 
 if TYPE_CHECKING:
     from .app import RunOutcome
@@ -82,8 +82,6 @@ def run(
     Exit status: 0 achieved, 1 not achieved, 2 wrong use or missing set-up, 130 stopped with Ctrl-C.
     """
     with _errors_told(as_json):
-        if (task is None) == (scene is None):
-            raise UsageError("Name either --task NAME (`maniagent tasks` lists them) or --scene FILE.yaml.")
         from .app import run as run_app
         from .console.folder import default_folder
         from .console.progress import Progress
@@ -176,8 +174,8 @@ def _tell_outcome(outcome: RunOutcome, as_json: bool) -> None:
     from .console.summary import summarise
 
     if as_json:
-        known = {"task": outcome.task, "seed": outcome.seed, "achieved": outcome.achieved, "out": outcome.out}
-        print_json(summarise(outcome.result, **known))
+        achieved, out = outcome.achieved, outcome.out
+        print_json(summarise(outcome.result, task=outcome.task, seed=outcome.seed, achieved=achieved, out=out))
     else:
         print_verdict(outcome.result, outcome.achieved, outcome.out and outcome.out / REPORT)
 

@@ -1,6 +1,7 @@
 import html.parser
 import json
 import re
+from itertools import pairwise
 from pathlib import Path
 from typing import Any
 
@@ -12,6 +13,7 @@ from hypothesis import strategies as st
 from maniagent.console import page
 from maniagent.console.recorder import Recorder
 from maniagent.console.report import write_report
+from maniagent.console.story import read_story
 from maniagent.errors import UsageError
 
 SMALL = (96, 72)
@@ -157,3 +159,12 @@ def test_seconds_come_from_the_events_where_the_run_did_not_count_them(tmp_path:
     path.write_text("\n".join(json.dumps(line) for line in lines[:-1]))
     reader = Reader(write_report(tmp_path).read_text())
     assert "observe 0.39 s" in reader.text
+
+
+def test_the_timeline_covers_the_whole_run_without_gaps(tmp_path: Path) -> None:
+    recorded(tmp_path)
+    story = read_story(tmp_path)
+    spans = [span for turn in story.turns for span in turn.spans]
+    assert spans[0].start == 0.0
+    assert spans[-1].end == story.seconds
+    assert all(before.end == after.start for before, after in pairwise(spans))

@@ -16,6 +16,8 @@ from typing import Any
 
 from PIL import Image
 
+from .story import Span
+
 SEEK_SCRIPT = """
 document.addEventListener("click", (event) => {
   const button = event.target.closest("[data-seek]");
@@ -97,12 +99,12 @@ def table(head: Sequence[str], rows: Iterable[Sequence[str]], kind: str = "") ->
     return f'<div class="scroll">{opening}<thead><tr>{top}</tr></thead><tbody>{body}</tbody></table></div>'
 
 
-def stage_bar(spans: Iterable[tuple[str, float]], total: float) -> str:
-    """A stacked bar of (stage, seconds), `total` seconds wide."""
+def stage_bar(spans: Iterable[Span], total: float) -> str:
+    """A stacked bar of stages, `total` seconds wide."""
     parts = []
-    for stage, seconds in spans:
-        share = 100 * seconds / total if total > 0 else 0.0
+    for span in spans:
+        share = 100 * span.seconds / total if total > 0 else 0.0
         if share >= 0.05:
-            label = f"{text(stage)}: {seconds:.2f} s"
-            parts.append(f'<i class="stage-{text(stage)}" style="width:{share:.2f}%" title="{label}"></i>')
+            label = f"{text(span.label)}: {span.seconds:.2f} s"
+            parts.append(f'<i class="stage-{text(span.stage)}" style="width:{share:.2f}%" title="{label}"></i>')
     return f'<div class="bar">{"".join(parts)}</div>'

@@ -109,7 +109,7 @@ def _timeline(story: Story) -> str:
         f"{turn.number}</a>"
         for turn in story.turns
     )
-    bar = page.stage_bar(((span.stage, span.seconds) for span in spans), total)
+    bar = page.stage_bar(spans, total)
     return (
         f'<section class="timeline"><h2>Timeline</h2>{bar}<nav aria-label="Turns" class="marks">{marks}</nav>'
         f'<p class="scale"><span>0 s</span><span>{total:.1f} s</span></p></section>'

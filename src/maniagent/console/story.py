@@ -41,6 +41,11 @@ class Span:
         """Its length, s."""
         return self.end - self.start
 
+    @property
+    def label(self) -> str:
+        """The stage in words: the log can't tell writing a sequence from planning it, which go to and fro."""
+        return "control and planning" if self.stage == "control" else self.stage
+
 
 @dataclass
 class Turn:
@@ -136,6 +141,8 @@ def _add(story: Story, event: Json) -> None:
         return
     if event["kind"] == "run_finished":
         story.finish = event
+        if story.turns:  # between the last word of the agents and the end the arm goes home
+            story.turns[-1].spans.append(Span("execution", before, event["time"]))
         return
     if not story.turns or story.turns[-1].number != event["turn"]:
         story.turns.append(Turn(event["turn"]))

@@ -92,7 +92,7 @@ def _pictures(story: Story, turn: Turn) -> str:
 
 def _decided(turn: Turn) -> str:
     subtask = turn.subtask
-    scene = f"<h4>Seen</h4><p>{text(turn.scene['text'])}</p>" if turn.scene.get("text") else ""
+    scene = f'<h4>Seen</h4><p class="lines">{text(turn.scene["text"])}</p>' if turn.scene.get("text") else ""
     if not subtask:
         return scene
     if subtask["previous"] == "initial":
@@ -206,9 +206,9 @@ def _happened(turn: Turn) -> str:
 
 def _stages(turn: Turn) -> str:
     total = sum(span.seconds for span in turn.spans)
-    bar = page.stage_bar(((span.stage, span.seconds) for span in turn.spans), total)
+    bar = page.stage_bar(turn.spans, total)
     words = " · ".join(
-        f'<span><i class="dot stage-{text(span.stage)}"></i>{text(span.stage)} {span.seconds:.2f} s</span>'
+        f'<span><i class="dot stage-{text(span.stage)}"></i>{text(span.label)} {span.seconds:.2f} s</span>'
         for span in turn.spans
         if span.seconds >= 0.005
     )
