@@ -22,6 +22,8 @@ ROTATION_TOLERANCE = 1.7e-3
 
 _AT_LIMIT = 1e-5
 """rad."""
+_NEARLY = 0.1
+"""rad: a closed-form posture no further beyond a limit may turn into one within it."""
 _MAX_STEPS = 15
 _RESTARTS = 8
 
@@ -85,7 +87,8 @@ class IKSolver:
         if any(self._reaches(q, T_base_tcp) for q in seeds):
             return []  # the closed form is exact for this model: its postures are all there are
         low, high = self.model.lower + self.joint_margin, self.model.upper - self.joint_margin
-        found = [q for seed in seeds if (q := self._converge(T_base_tcp, np.clip(seed, low, high))) is not None]
+        plausible = [np.clip(q, low, high) for q in seeds if np.abs(np.clip(q, low, high) - q).max() < _NEARLY]
+        found = [q for seed in plausible if (q := self._converge(T_base_tcp, seed)) is not None]
         rng = np.random.default_rng(0)
         for _ in range(0 if found else _RESTARTS):
             q = self._converge(T_base_tcp, np.clip(near + rng.normal(0.0, 0.7, 6), low, high))

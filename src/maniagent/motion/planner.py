@@ -46,18 +46,19 @@ class MotionPlanner:
     ) -> MotionPlan:
         """Moves through all key points, from the posture `start` ((6,) rad) with the fingers `opening` (m) apart.
 
-        `boxes` are the objects by index. With `jaw_symmetry` the whole sequence may be done with the two fingers
-        swapped, where that turns the wrist less; not when something is already in the gripper, since it would turn
+        `boxes` are the objects by index. With `jaw_symmetry` an empty hand takes whichever of the two equal
+        orientations (fingers swapped or not) is nearer, and keeps it while it carries something, which would turn
         too. Raises MotionRejected, naming the key point and the reason.
         """
         begin = time.perf_counter()
         ways = [False]
         if jaw_symmetry and keypoints and keypoints[0].held is None:
-            ways = sorted((False, True), key=lambda swapped: self._travel(_target(keypoints[0], swapped), start))
+            first = self._nearer(keypoints[0], start, False)
+            ways = [first, not first]
         rejections: list[MotionRejected] = []
         for swapped in ways:
             try:
-                moves = self._moves(keypoints, start, Hand(self.model, opening, boxes), swapped)
+                moves = self._moves(keypoints, start, Hand(self.model, opening, boxes), swapped, jaw_symmetry)
             except MotionRejected as rejection:
                 rejections.append(rejection)
             else:
@@ -87,11 +88,14 @@ class MotionPlanner:
         return MotionPlan(tuple(moves), time.perf_counter() - begin)
 
     def _moves(
-        self, keypoints: Sequence[KeyPoint], start: FloatArray, hand: Hand, swapped: bool
+        self, keypoints: Sequence[KeyPoint], start: FloatArray, hand: Hand, swapped: bool, jaw_symmetry: bool
     ) -> tuple[PlannedMove, ...]:
+        """All moves, the fingers `swapped` or not at the first key point; raises MotionRejected."""
         moves, at = [], start
         for number, point in enumerate(keypoints, start=1):
             next_held = keypoints[number].held if number < len(keypoints) else None
+            if jaw_symmetry and number > 1 and hand.held is None and point.held is None:
+                swapped = self._nearer(point, at, swapped)
             T_base_goal = _target(point, swapped)
             try:
                 if outside := self.limits.outside(T_base_goal[:3, 3]):
@@ -117,6 +121,11 @@ class MotionPlanner:
             return replace(found, touches=point.touches)
         touches = point.touches | before.touches
         return MoveRules(hand.opening, touches if hand.just_released is None else touches | {hand.just_released})
+
+    def _nearer(self, point: KeyPoint, start: FloatArray, swapped: bool) -> bool:
+        """Whether to swap the fingers at a key point: as it is now, unless the other way turns the joints less."""
+        travel = {way: self._travel(_target(point, way), start) for way in (swapped, not swapped)}
+        return swapped if travel[swapped] <= travel[not swapped] else not swapped
 
     def _travel(self, T_base_goal: FloatArray, start: FloatArray) -> float:
         """How far the joints have to turn to a pose, rad; infinite where it is unreachable."""
