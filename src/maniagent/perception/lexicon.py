@@ -57,7 +57,8 @@ class Appearance:
     fill: float
     """Share of the footprint's rectangle that its convex hull covers."""
     shares: dict[str, float]
-    """By colour word: share of the surface; colours overlap, so these don't add up to 1."""
+    """By colour word, and by choices of the vocabulary such as "red or green": share of the surface. Colours
+    overlap, so these don't add up to 1."""
 
     @property
     def ratio(self) -> float:
@@ -70,6 +71,7 @@ class Lexicon:
 
     def __init__(self, vocabulary: Vocabulary) -> None:
         self._vocabulary = vocabulary
+        self._choices = {choice for noun in vocabulary.nouns.values() for choice in noun.colours}
 
     @classmethod
     def load(cls, path: Path | None = None) -> Self:
@@ -95,10 +97,10 @@ class Lexicon:
         fits = {noun: _fit(prior, look) for noun, prior in self._vocabulary.nouns.items()}
         noun = max(fits, key=fits.__getitem__, default=ANYTHING)
         if fits.get(noun, 0.0) < FLOOR:
-            return " ".join([*_colour_of(look), _shape_of(look), "object"])
+            return " ".join([*self._colour_of(look), _shape_of(look), "object"])
         varies = self._vocabulary.nouns[noun].varies
         size = [_size_of(look)] if "size" in varies else []
-        colour = _colour_of(look) if "colour" in varies else []
+        colour = self._colour_of(look) if "colour" in varies else []
         return " ".join([*filter(None, size), *colour, noun])
 
     def appearance(self, segment: Segment) -> Appearance:
@@ -111,7 +113,14 @@ class Lexicon:
 
     def _shares(self, colours: NDArray[np.uint8]) -> dict[str, float]:
         seen = hue_saturation_lightness(colours)
-        return {name: float(_membership(word, *seen).mean()) for name, word in self._vocabulary.colours.items()}
+        members = {name: _membership(word, *seen) for name, word in self._vocabulary.colours.items()}
+        either = {choice: np.max([members[name] for name in choice.split(" or ")], axis=0) for choice in self._choices}
+        return {name: float(member.mean()) for name, member in (members | either).items()}
+
+    def _colour_of(self, look: Appearance) -> list[str]:
+        """The colour word for most of the surface; none where no word fits."""
+        colour = max(self._vocabulary.colours, key=lambda name: look.shares[name], default="")
+        return [colour] if look.shares.get(colour, 0.0) >= ADJECTIVE_SHARE[1] else []
 
     # Scores -------------------------------------------------------------------------------------------------------
 
@@ -190,7 +199,7 @@ def _fit(noun: Noun, look: Appearance) -> float:
     if noun.fill is not None:
         fits.append(_in_share(look.fill, noun.fill))
     for choice, limits in noun.colours.items():
-        fits.append(_in_share(min(sum(look.shares[colour] for colour in choice.split(" or ")), 1.0), limits))
+        fits.append(_in_share(look.shares[choice], limits))
     return min(fits, default=1.0)
 
 
@@ -209,12 +218,6 @@ def _in_share(value: float, limits: tuple[float, float]) -> float:
 
 def _ramp(value: float, low: float, high: float) -> float:
     return float(np.clip((value - low) / (high - low), 0.0, 1.0))
-
-
-def _colour_of(look: Appearance) -> list[str]:
-    """The colour word for most of the surface; none where no word fits."""
-    colour = max(look.shares, key=look.shares.__getitem__, default="")
-    return [colour] if look.shares.get(colour, 0.0) >= ADJECTIVE_SHARE[1] else []
 
 
 def _shape_of(look: Appearance) -> str:
