@@ -93,6 +93,12 @@ class _Border:
         return all(np.linalg.norm(part.colour[1:] - 128.0) > SAME_HUE for part in (self.small, self.large))
 
     @property
+    def lies_on_cloth(self) -> bool:
+        """One of them is flat and the other is not: nothing grows out of a cloth."""
+        low, high = sorted((self.small.top, self.large.top))
+        return low < FLAT and high - low > LEVEL
+
+    @property
     def is_level(self) -> bool:
         return abs(self.step) < LEVEL
 
@@ -109,7 +115,8 @@ def _shaded_side(border: _Border) -> bool:
 def _limb(border: _Border) -> bool:
     """Head and body: of one colour, side by side, whatever their heights. What stands ON a thing has no outer side."""
     one_colour = border.same_colour or (border.same_hue and border.colourful)
-    return one_colour and border.share > 0.2 and border.outer > 0.25 * border.perimeter
+    beside = border.share > 0.2 and border.outer > 0.25 * border.perimeter
+    return one_colour and beside and not border.lies_on_cloth
 
 
 def _vessel(border: _Border) -> bool:
@@ -119,7 +126,8 @@ def _vessel(border: _Border) -> bool:
 
 def _print(border: _Border) -> bool:
     """A pattern within a surface: no step, and (almost) no border with the table."""
-    return border.is_level and border.share > 0.35 and border.outer < 0.1 * border.perimeter
+    no_higher = border.small.top < border.large.top + LEVEL
+    return border.is_level and no_higher and border.share > 0.35 and border.outer < 0.1 * border.perimeter
 
 
 def _cloth(border: _Border) -> bool:
@@ -127,10 +135,12 @@ def _cloth(border: _Border) -> bool:
 
 
 def _attachment(border: _Border) -> bool:
-    """A stem, a beak, a leaf: tiny, or small and level with what it grows from."""
+    """A stem, a beak, a leaf: tiny, or small, level with what it grows from, and at its edge, not on it."""
     if border.small.area < TINY:
         return border.share > 0.05
-    return border.small.area < 0.35 * border.large.area and abs(border.step) < 0.006 and border.share > 0.25
+    at_the_edge = border.outer > 0.15 * border.perimeter and not border.lies_on_cloth
+    small = border.small.area < 0.35 * border.large.area
+    return at_the_edge and small and abs(border.step) < 0.006 and border.share > 0.25
 
 
 def _end_to_end(border: _Border) -> bool:
@@ -161,7 +171,22 @@ def merge_regions(labels: Labels, grid: HeightMap) -> Labels:
     graph = _Graph(labels, grid)
     while pair := next((pair for rule in _RULES for pair, border in graph.borders() if rule(border)), None):
         graph.merge(*pair)
+    while pair := _parted(graph):
+        graph.merge(*pair)
     return graph.labels
+
+
+def _parted(graph: _Graph) -> tuple[int, int] | None:
+    """Two pieces of one cloth that something lying across it parts: flat, and beside the same thing."""
+    beside: dict[int, list[int]] = {}
+    for (a, b), _ in graph.borders():
+        for flat, other in ((a, b), (b, a)):
+            if graph.regions[flat].top < FLAT < graph.regions[other].top:
+                beside.setdefault(other, []).append(flat)
+    for pieces in beside.values():
+        if len(pieces) > 1:
+            return pieces[0], pieces[1]
+    return None
 
 
 class _Graph:
@@ -176,7 +201,7 @@ class _Graph:
         order = np.argsort(labels, axis=None, kind="stable")
         bounds = np.searchsorted(labels.ravel()[order], np.arange(labels.max() + 2))
         cells = np.column_stack(np.unravel_index(order, labels.shape))
-        self._regions = {
+        self.regions = {
             label: self._measure(cells[low:high], label)
             for label, (low, high) in enumerate(pairwise(bounds))
             if label > 0 and high > low
@@ -185,13 +210,13 @@ class _Graph:
 
     def merge(self, keep: int, drop: int) -> None:
         """Make one region of two neighbours."""
-        cells = np.concatenate([self._regions[keep].cells, self._regions.pop(drop).cells])
+        cells = np.concatenate([self.regions[keep].cells, self.regions.pop(drop).cells])
         self.labels[cells[:, 0], cells[:, 1]] = keep
         self._first[self._first == drop] = keep
         self._second[self._second == drop] = keep
         border = self._first != self._second
         self._first, self._second, self._step = self._first[border], self._second[border], self._step[border]
-        self._regions[keep] = self._measure(cells, keep)
+        self.regions[keep] = self._measure(cells, keep)
         self._borders = None
 
     def borders(self) -> list[tuple[tuple[int, int], _Border]]:
@@ -213,12 +238,12 @@ class _Graph:
             if a == 0:
                 continue
             rise = float(rises[i])
-            small, large = (a, b) if self._regions[a].area <= self._regions[b].area else (b, a)
+            small, large = (a, b) if self.regions[a].area <= self.regions[b].area else (b, a)
             yield (
                 (a, b),
                 _Border(
-                    small=self._regions[small],
-                    large=self._regions[large],
+                    small=self.regions[small],
+                    large=self.regions[large],
                     length=int(counts[i]),
                     step=rise if small == a else -rise,
                     perimeter=int(perimeter[small]),

@@ -23,9 +23,9 @@ from .views import RobotFilter, Tuning, ViewPoints, Workspace, foreground
 Labels = NDArray[np.int32]
 """(X, Y), 0 where nothing stands, else the number of a region, from 1."""
 
-COLOUR_STEP = 20.0
+COLOUR_STEP = 15.0
 """CIE Lab distance over EDGE_SPAN that makes an edge."""
-HEIGHT_STEP = 0.008
+HEIGHT_STEP = 0.006
 """m over EDGE_SPAN that makes an edge."""
 EDGE_SPAN = 2
 """Cells to either side of the one that is judged."""

@@ -38,7 +38,7 @@ class SimulatedArm:
             joint_velocities=self._env.joint_velocities,
             joint_efforts=self._env.joint_efforts,
             gripper_opening=state.gripper_opening,
-            gripper_effort=-self._env.gripper_effort,
+            gripper_effort=-self._env.gripper_effort / 2,  # the servo drives both fingers
             time=state.time,
         )
 
