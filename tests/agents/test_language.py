@@ -9,6 +9,7 @@ import pytest
 from hypothesis import given
 from hypothesis import strategies as st
 
+from maniagent import tasks
 from maniagent.agents.rules.commands import Action, Command, Direction, Relation
 from maniagent.agents.rules.language import NeedsLanguageModel, UnclearInstruction, parse_instruction
 from maniagent.errors import ReasoningFailure
@@ -248,6 +249,9 @@ def test_what_needs_judgement_is_left_to_a_language_model(text: str) -> None:
         ("put the carrot on the table", "Where on the table"),
         ("put the carrot between the plate and the cup", "can't work out"),
         ("put the carrot on the plate next to the cup", "several ways"),
+        ("move the cup closer to the plate", "can't work out"),
+        ("turn on the light", "noun is missing"),
+        ("pick up the block next to on the plate", "noun is missing"),
         ("put both peppers on the plate", "several objects"),
         ("stack the red block next to the blue block", "On what"),
         ("rotate the spoon", "By how much"),
@@ -276,6 +280,17 @@ def test_what_needs_judgement_is_left_to_a_language_model(text: str) -> None:
 def test_half_understood_commands_get_a_precise_complaint(text: str, complaint: str) -> None:
     with pytest.raises(UnclearInstruction, match=complaint):
         parse_instruction(text)
+
+
+@pytest.mark.parametrize("name", tasks.names())
+def test_the_tasks_own_instructions(name: str) -> None:
+    task = tasks.get(name)
+    instruction = task.instruction.replace("{goal}", "(0.30, 0.10)")
+    if task.needs_model:
+        with pytest.raises(NeedsLanguageModel):
+            parse_instruction(instruction)
+    else:
+        assert len(parse_instruction(instruction)) == 1
 
 
 # Laws -----------------------------------------------------------------------------------------------------------

@@ -98,6 +98,8 @@ class _Reader:
 
     def read(self, words: Sequence[str]) -> Reference:
         """One phrase; landmarks are read in turn."""
+        while words and words[0] in _ARTICLES:
+            words = words[1:]
         head: list[str] = []
         pick: Pick | None = None
         at = 0
@@ -121,8 +123,8 @@ class _Reader:
 
     def _head(self, head: Sequence[str], words: Sequence[str]) -> Reference:
         """Adjectives and noun: the longest known noun that ends the head."""
-        phrase = " ".join(words)
         anyone = bool(head) and head[0] == "any"
+        phrase = " ".join(words[anyone:])
         said = [word for word in head[anyone:] if word not in _ARTICLES]
         for start in range(len(said)):
             noun = self._noun(" ".join(said[start:]), anyone)

@@ -59,7 +59,7 @@ PHRASES: PhraseTable[Meaning] = PhraseTable(
         **spelt("off | off of | from | from on", Mark.OFF),
         **spelt("out of | from inside | from within", Mark.OUT_OF),
         **spelt("between | under | below | beneath | underneath | above | over | around | across", Mark.UNKNOWN),
-        **spelt("against | opposite | along | through", Mark.UNKNOWN),
+        **spelt("against | opposite | along | through | closer to | nearer to | away from | far from", Mark.UNKNOWN),
         **{f"{lead} the {part} of": Mark.UNKNOWN for lead in ("on", "at", "in") for part in ("corner", "edge", "rim")},
     }
 )
@@ -88,7 +88,9 @@ def noun_phrase(words: Sequence[str]) -> str:
         elif meaning is not None and named:
             said += _relation(meaning, words)
             named = False
-        elif meaning is None and after is Mark.RELATIVE:
+        elif meaning is not None:
+            raise UnclearInstruction(f"{quote(words)} doesn't say which object: a noun is missing.")
+        elif after is Mark.RELATIVE:
             raise NeedsLanguageModel(f"{quote(words)} describes an object by more than its looks and place.")
         elif phrase[0] not in DETERMINERS:
             said += phrase
