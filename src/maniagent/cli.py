@@ -73,9 +73,9 @@ def run(
 
       maniagent run --task carrot-on-plate
 
-      maniagent run "move the carrot next to the plate" --task carrot-on-plate
+      maniagent run --task spoon-on-towel --seed 7 --out runs/spoon
 
-      maniagent run "put the spoon on the towel" --scene kitchen.yaml --seed 7
+      maniagent run "put the spoon on the towel" --scene kitchen.yaml
 
       maniagent run --task green-on-yellow --json | jq .achieved
 

@@ -198,7 +198,8 @@ def _happened(turn: Turn) -> str:
             lines.append(f"{stage} After {turn.report['reached']} key points: {text(turn.report['reason'])}")
     reported = turn.report.get("reason")
     lines += [f"{badge(f['stage'], 'bad')} {text(f['reason'])}" for f in turn.failures if f["reason"] != reported]
-    if turn.judged.get("previous") in ("success", "failure"):
+    told = {reported, *(failure["reason"] for failure in turn.failures)}
+    if turn.judged.get("previous") in ("success", "failure") and turn.judged["reason"] not in told:
         tone = "good" if turn.judged["previous"] == "success" else "bad"
         lines.append(f"{badge('judged ' + turn.judged['previous'], tone)} {text(turn.judged['reason'])}")
     return "<h4>Happened</h4>" + "".join(f"<p>{line}</p>" for line in lines) if lines else ""
