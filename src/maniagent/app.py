@@ -2,12 +2,13 @@
 
 from __future__ import annotations
 
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from contextlib import ExitStack
 from dataclasses import dataclass
 from pathlib import Path
 
 import numpy as np
+from numpy.typing import NDArray
 
 from .agents.events import EventLog, Observer
 from .agents.loop import AgentLoop
@@ -15,8 +16,9 @@ from .agents.rules import rules_agents
 from .console.recorder import Recorder
 from .envs.tabletop import TabletopEnv
 from .errors import UsageError
+from .robots.robot import Robot
 from .robots.simulated import SimulatedRobot
-from .tasks import Episode, Task, get, load_task
+from .tasks import Task, get, load_task
 from .types import RunResult
 
 
@@ -70,7 +72,8 @@ def run(
             raise UsageError("There is no instruction: say one, or write one into the scene file.")
         recorders = [] if folder is None else [stack.enter_context(Recorder(folder))]
         log = EventLog([*recorders, *observers])
-        result, achieved = _carry_out(env, episode, said, name, seed, log)
+        robot = SimulatedRobot(env, on_frame=_film(log) if folder is not None else None)
+        result, achieved = _carry_out(robot, said, name, seed, log, lambda: episode.achieved(env.truth()))
     return RunOutcome(name, seed, said, result, achieved, folder)
 
 
@@ -80,14 +83,17 @@ def _choose(task: str | None, scene: str | Path | None) -> Task:
     return get(task) if task is not None else load_task(Path(str(scene)))
 
 
+def _film(log: EventLog) -> Callable[[NDArray[np.uint8], float], None]:
+    return lambda rgb, robot_time: log.emit("frame", rgb=rgb, robot_time=robot_time)
+
+
 def _carry_out(
-    env: TabletopEnv, episode: Episode, instruction: str, task: str | None, seed: int, log: EventLog
+    robot: Robot, instruction: str, task: str | None, seed: int, log: EventLog, achieved_now: Callable[[], bool | None]
 ) -> tuple[RunResult, bool | None]:
-    """Run the loop; what is true is looked at only when the agents are through."""
-    robot = SimulatedRobot(env, on_frame=lambda rgb, at: log.emit("frame", rgb=rgb, robot_time=at))
+    """Run the loop; what is true is asked only when the agents are through."""
     agents = rules_agents(robot.covers)
     log.emit("run_started", instruction=instruction, task=task, seed=seed, agents=agents.name)
     result = AgentLoop(robot, agents, log).run(instruction)
-    achieved = episode.achieved(env.truth())
+    achieved = achieved_now()
     log.emit("run_finished", result=result, achieved=achieved)
     return result, achieved

@@ -13,7 +13,7 @@ Kinds of events and their data:
 | move | turn, description, seconds (robot time the move will take) |
 | executed | turn, report |
 | failed | turn, stage, reason |
-| frame | rgb, robot_time: the main view while the arm moves, for the video |
+| frame | rgb, robot_time: the main view while the arm moves, for the video; only in runs that are recorded |
 | run_finished | result, achieved (by the task's predicate; None where nobody knows) |
 """
 

@@ -67,6 +67,8 @@ class DepthNoise:
     """m; depth steps larger than this lose their returns within a pixel or two."""
     dropout: float = 0.002
     """Share of small spots without a return."""
+    blur: float = 0.6
+    """px, sigma of the lens's blur."""
     colour_sigma: float = 2.0
     """RMS of the colour noise, grey levels."""
 
@@ -75,7 +77,7 @@ class DepthNoise:
         # Block matching looks at windows: its errors are correlated over a few pixels. Blurring white noise with
         # sigma 1.2 px divides its RMS by 2 sqrt(pi) 1.2.
         noise = cv2.GaussianBlur(rng.standard_normal(clean.shape, dtype=np.float32), (0, 0), 1.2)
-        noise *= np.float32(2.0 * np.sqrt(np.pi) * 1.2)
+        noise = noise * np.float32(2.0 * np.sqrt(np.pi) * 1.2)
         sigma = np.square(clean) * np.float32(self.subpixel / (focal_length * self.baseline))
         kernel = np.ones((3, 3), np.uint8)
         step = cv2.dilate(clean, kernel) - cv2.erode(clean, kernel)
@@ -84,6 +86,7 @@ class DepthNoise:
         return np.where(lost, np.float32(np.nan), clean + noise * sigma).astype(np.float32)
 
     def colour(self, clean: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
-        """A noisy copy of an RGB image (H, W, 3)."""
+        """A noisy copy of an RGB image (H, W, 3), a little out of focus as through any lens."""
+        clean = np.asarray(cv2.GaussianBlur(clean, (0, 0), self.blur), np.uint8)
         noise = rng.standard_normal(clean.shape, dtype=np.float32) * np.float32(self.colour_sigma)
         return np.clip(clean + noise, 0, 255).astype(np.uint8)

@@ -8,6 +8,7 @@ fingers, knuckles or palm go. The same test finds a grasp across a carrot and on
 
 from __future__ import annotations
 
+from collections.abc import Sequence
 from dataclasses import dataclass
 
 import numpy as np
@@ -43,8 +44,8 @@ class GripperShape:
 class GraspTuning:
     """How candidates are drawn and judged."""
 
-    centres: int = 40
-    yaws: int = 18
+    centres: int = 36
+    yaws: int = 12
     friction: float = 0.6
     """Coefficient of friction counted on: flanks steeper than its cone squeeze out."""
     tip_clearance: float = 0.004
@@ -75,25 +76,50 @@ def propose_grasps(
     if len(surface) < 4:
         return ()
     centres = _spread_out(surface, tuning.centres)
-    candidates = [_at_yaw(yaw, centres, surface, segment, grid, gripper, tuning) for yaw in _yaws(segment, tuning)]
-    found = _Candidates.concatenate(candidates)
+    # At yaw 0 the closing axis is base +y, which lies across an object whose long side is along base +x.
+    yaws = segment.yaw + np.arange(tuning.yaws) * np.pi / tuning.yaws
+    sections = [_sections(yaw, centres, surface, segment, gripper, tuning) for yaw in yaws]
+    found = _Candidates.concatenate([part for parts in sections for part in parts])
+    found = found.take(_closes(found, gripper, tuning))
+    found = found.take(_has_room(found, grid, gripper, tuning))
     return _best(found, segment, gripper, tuning)
 
 
 @dataclass(frozen=True)
 class _Candidates:
-    """Grasps as arrays (N, ...): TCP positions, closing directions, openings, scores."""
+    """Candidates as arrays (N, ...)."""
 
-    tcp: FloatArray
+    origin: FloatArray
+    """(N, 2) m, base frame: the middle of the cross-section."""
+    tip: FloatArray
+    """(N,) m, height of the fingertips."""
     yaw: FloatArray
-    opening: FloatArray
-    score: FloatArray
+    """(N,) rad."""
+    width: FloatArray
+    """(N,) m, of the cross-section along the closing axis; not finite where there is none."""
+    slope: FloatArray
+    """(N,) tangent of the larger angle between a flank's normal and the closing axis, seen from above."""
+    overlap: FloatArray
+    """(N,) m, from the fingertips up to the object's top."""
+
+    def take(self, index: NDArray[np.intp] | BoolArray) -> _Candidates:
+        """Some of them."""
+        return _Candidates(*(array[index] for array in vars(self).values()))
 
     @staticmethod
-    def concatenate(parts: list[_Candidates]) -> _Candidates:
-        return _Candidates(
-            *(np.concatenate([getattr(part, name) for part in parts]) for name in ("tcp", "yaw", "opening", "score"))
-        )
+    def concatenate(parts: Sequence[_Candidates]) -> _Candidates:
+        """All of several."""
+        return _Candidates(*(np.concatenate(arrays) for arrays in zip(*(vars(p).values() for p in parts), strict=True)))
+
+    @property
+    def axes(self) -> tuple[FloatArray, FloatArray]:
+        """(N, 2) unit vectors each: across the fingers (u), along the closing axis (v)."""
+        c, s = np.cos(self.yaw), np.sin(self.yaw)
+        return np.stack([c, s], axis=-1), np.stack([-s, c], axis=-1)
+
+    def opening(self, gripper: GripperShape, tuning: GraspTuning) -> FloatArray:
+        """(N,) m, how far the fingers are opened on the way down."""
+        return np.minimum(self.width + 2 * (tuning.finger_clearance + tuning.spread), gripper.max_opening)
 
 
 def _surface(segment: Segment, grid: HeightMap) -> FloatArray:
@@ -116,137 +142,118 @@ def _spread_out(surface: FloatArray, count: int) -> FloatArray:
     return surface[chosen]
 
 
-def _yaws(segment: Segment, tuning: GraspTuning) -> FloatArray:
-    """Closing directions: evenly spread, beginning with the one straight across the object."""
-    # At yaw 0 the closing axis is base +y, which lies across an object whose long side is along base +x.
-    return segment.yaw + np.arange(tuning.yaws) * np.pi / tuning.yaws
-
-
-def _at_yaw(
+def _sections(
     yaw: float,
     centres: FloatArray,
     surface: FloatArray,
     segment: Segment,
-    grid: HeightMap,
     gripper: GripperShape,
     tuning: GraspTuning,
-) -> _Candidates:
-    """All candidates with one closing direction."""
-    to_gripper = rotation_z(yaw)[:2, :2]  # columns: across the fingers (u), along the closing axis (v)
-    du = surface[None, :, 0:2] @ to_gripper[:, 0] - (centres[:, :2] @ to_gripper[:, 0])[:, None]  # (C, N)
-    dv = surface[None, :, 0:2] @ to_gripper[:, 1] - (centres[:, :2] @ to_gripper[:, 1])[:, None]
-    z = surface[None, :, 2]
-    between = (np.abs(du) < tuning.strip) & (np.abs(dv) < tuning.window)
-    top = np.max(np.where(between & (np.abs(dv) < tuning.strip), z, -np.inf), axis=1)  # (C,)
-    flat = top - segment.support_z < 0.014
-    floor = segment.support_z + np.where(flat, tuning.tip_clearance / 2, tuning.tip_clearance)
+) -> list[_Candidates]:
+    """The cross-sections at every centre for one closing direction, at one or two depths."""
+    to_gripper = rotation_z(yaw)[:2, :2]  # columns: u, v
+    at, of = surface[:, :2] @ to_gripper, centres[:, :2] @ to_gripper
+    near = (np.abs(at[:, 0] - of[:, 0, None]) < tuning.strip) & (np.abs(at[:, 1] - of[:, 1, None]) < tuning.window)
+    owner, member = np.nonzero(near)  # pairs: which centre, which point
+    du, dv = (at[member] - of[owner]).T
+    z = surface[member, 2]
+    central = np.abs(dv) < tuning.strip
+    top = _largest(z[central], owner[central], len(centres))
+    clearance = np.where(top - segment.support_z < 0.014, tuning.tip_clearance / 2, tuning.tip_clearance)
+    deep = np.maximum(segment.support_z + clearance, top - gripper.palm_height + 0.003)
+    # As deep as table and palm allow; and, for walls and rims, just over the edge.
+    shallow = np.maximum(deep, top - 0.014)
     parts = []
-    # As deep as table and palm allow; and just over the edge, for walls and rims.
-    for depth in (gripper.palm_height - 0.003, 0.014):
-        tip = np.maximum(floor, top - depth)
-        section = between & (z > tip[:, None] + 0.001)
-        low, high = _bounds(dv, section)
-        closure = _closure(du, dv, section, tuning)
-        middle = (low + high) / 2
-        width = high - low
-        origin = centres[:, :2] + middle[:, None] * to_gripper[:, 1]
-        opening = np.minimum(width + 2 * (tuning.finger_clearance + tuning.spread), gripper.max_opening)
-        good = np.isfinite(width) & (width + 2 * tuning.finger_clearance <= gripper.max_opening)
-        good &= (closure > np.cos(np.arctan(tuning.friction))) & (top - tip >= tuning.min_overlap)
-        index = np.flatnonzero(good)
-        room = _has_room(origin[index], tip[index], opening[index], to_gripper, grid, gripper)
-        index = index[room]
-        tcp = np.column_stack([origin[index], tip[index] + gripper.tip])
-        score = _score(tcp, width[index], closure[index], (top - tip)[index], segment, gripper)
-        parts.append(_Candidates(tcp, np.full(len(index), yaw), opening[index], score))
-    return _Candidates.concatenate(parts)
+    for tip in [deep] if (shallow - deep).max() < 0.0015 else [deep, shallow]:
+        inside = z > tip[owner] + 0.001
+        low, high, slope = _flanks(du[inside], dv[inside], owner[inside], len(centres), tuning)
+        with np.errstate(invalid="ignore"):
+            origin = centres[:, :2] + ((low + high) / 2)[:, None] * to_gripper[:, 1]
+            parts.append(_Candidates(origin, tip, np.full(len(centres), yaw), high - low, slope, top - tip))
+    return parts
 
 
-def _bounds(dv: FloatArray, section: BoolArray) -> tuple[FloatArray, FloatArray]:
-    """(C,) lowest and highest v of each cross-section; infinite where it is empty."""
-    low = np.min(np.where(section, dv, np.inf), axis=1)
-    high = np.max(np.where(section, dv, -np.inf), axis=1)
-    return np.where(np.isfinite(low), low, np.inf), np.where(np.isfinite(high), high, -np.inf)
+def _flanks(
+    du: FloatArray, dv: FloatArray, owner: NDArray[np.intp], count: int, tuning: GraspTuning
+) -> tuple[FloatArray, FloatArray, FloatArray]:
+    """Lowest and highest v of each cross-section, and the slope of its flanks, from the strip's two halves.
 
-
-def _closure(du: FloatArray, dv: FloatArray, section: BoolArray, tuning: GraspTuning) -> FloatArray:
-    """(C,) cosine of the larger angle between a flank's normal and the closing axis, seen from above.
-
-    The flanks' directions come from the cross-section's bounds in the strip's two halves. Zero where a half is empty:
-    the fingers would close on a corner.
+    Nothing is finite where a half is empty: the fingers would close on a corner.
     """
+    first = du < 0
     with np.errstate(invalid="ignore"):
-        low_a, high_a = _bounds(dv, section & (du < 0))
-        low_b, high_b = _bounds(dv, section & (du >= 0))
+        low_a, high_a = -_largest(-dv[first], owner[first], count), _largest(dv[first], owner[first], count)
+        low_b, high_b = -_largest(-dv[~first], owner[~first], count), _largest(dv[~first], owner[~first], count)
         slope = np.maximum(np.abs(low_a - low_b), np.abs(high_a - high_b)) / tuning.strip
-    return np.where(np.isfinite(slope), np.cos(np.arctan(slope)), 0.0)
+    return np.minimum(low_a, low_b), np.maximum(high_a, high_b), slope
 
 
-def _has_room(
-    origin: FloatArray,
-    tip: FloatArray,
-    opening: FloatArray,
-    to_gripper: FloatArray,
-    grid: HeightMap,
-    gripper: GripperShape,
-) -> BoolArray:
-    """(C,) whether nothing stands where the open fingers, their knuckles and the palm go."""
-    free = np.ones(len(origin), bool)
+def _largest(values: FloatArray, owner: NDArray[np.intp], count: int) -> FloatArray:
+    """(count,) the largest value of each owner; minus infinity where it has none."""
+    out = np.full(count, -np.inf)
+    np.maximum.at(out, owner, values)
+    return out
+
+
+def _closes(found: _Candidates, gripper: GripperShape, tuning: GraspTuning) -> BoolArray:
+    """(N,) whether the cross-section fits between the pads, squarely and deep enough."""
+    with np.errstate(invalid="ignore"):
+        fits = found.width + 2 * tuning.finger_clearance <= gripper.max_opening
+        return fits & (found.width > 0) & (found.slope < tuning.friction) & (found.overlap >= tuning.min_overlap)
+
+
+def _has_room(found: _Candidates, grid: HeightMap, gripper: GripperShape, tuning: GraspTuning) -> BoolArray:
+    """(N,) whether nothing stands where the open fingers, their knuckles and the palm go."""
+    free = np.ones(len(found.tip), bool)
+    half_opening = found.opening(gripper, tuning)[:, None] / 2
     for thickness, half_width, height in (
         (gripper.finger_thickness, gripper.finger_half_width, 0.0),
         (gripper.knuckle_thickness, gripper.knuckle_half_width, gripper.knuckle_height),
     ):
-        v = opening[:, None] / 2 + np.linspace(0.001, thickness, 4)  # (C, 4)
-        for side in (-1.0, 1.0):
-            free &= _highest(origin, side * v, half_width, to_gripper, grid) < tip + height
-    span = np.broadcast_to(np.linspace(-gripper.palm_half_span, gripper.palm_half_span, 12), (len(origin), 12))
-    return free & (_highest(origin, span, gripper.palm_half_width, to_gripper, grid) < tip + gripper.palm_height)
+        v = half_opening + np.linspace(0.001, thickness, 4)
+        both = np.concatenate([-v, v], axis=1)
+        free &= _highest(found, both, half_width, grid) < found.tip + height
+    span = np.linspace(-gripper.palm_half_span, gripper.palm_half_span, 12)
+    palm = np.broadcast_to(span, (len(found.tip), len(span)))
+    return free & (_highest(found, palm, gripper.palm_half_width, grid) < found.tip + gripper.palm_height)
 
 
-def _highest(
-    origin: FloatArray, v: FloatArray, half_width: float, to_gripper: FloatArray, grid: HeightMap
-) -> NDArray[np.floating]:
-    """(C,) the highest cell under a grid of sample points at v (C, K) along the closing axis, across the width."""
+def _highest(found: _Candidates, v: FloatArray, half_width: float, grid: HeightMap) -> NDArray[np.floating]:
+    """(N,) the highest cell under sample points at v (N, K) along the closing axis, across the width."""
+    across, along = found.axes
     u = np.linspace(-half_width, half_width, 5)
-    offsets = v[:, :, None, None] * to_gripper[:, 1] + u[None, None, :, None] * to_gripper[:, 0]  # (C, K, 5, 2)
-    cells = grid.cells(origin[:, None, None, :] + offsets)
+    offsets = v[:, :, None, None] * along[:, None, None, :] + u[:, None] * across[:, None, None, :]  # (N, K, 5, 2)
+    cells = grid.cells(found.origin[:, None, None, :] + offsets)
     return grid.height[cells[..., 0], cells[..., 1]].max(axis=(1, 2), initial=0.0)
 
 
-def _score(
-    tcp: FloatArray,
-    width: FloatArray,
-    closure: FloatArray,
-    overlap: FloatArray,
-    segment: Segment,
-    gripper: GripperShape,
-) -> FloatArray:
-    """(C,) in [0, 1]: square to the flanks, deep, near the middle (its weight turns it less), not at full stretch."""
+def _scores(found: _Candidates, segment: Segment, gripper: GripperShape) -> FloatArray:
+    """(N,) in [0, 1]: square to the flanks, deep, near the middle (its weight turns it less), not at full stretch."""
     length = max(float(segment.extent[0]), 0.02)
-    off_centre = np.linalg.norm(tcp[:, :2] - segment.centre[:2], axis=1) / (length / 2)
-    depth = np.clip(overlap / min(0.02, max(float(segment.extent[2]), 0.005)), 0.0, 1.0)
-    stretch = np.clip((gripper.max_opening - width) / 0.012, 0.0, 1.0)
-    return closure**2 * (0.4 + 0.6 * depth) * (1.0 - 0.7 * np.clip(off_centre, 0.0, 1.0)) * (0.8 + 0.2 * stretch)
+    off_centre = np.linalg.norm(found.origin - segment.centre[:2], axis=1) / (length / 2)
+    depth = np.clip(found.overlap / min(0.02, max(float(segment.extent[2]), 0.005)), 0.0, 1.0)
+    stretch = np.clip((gripper.max_opening - found.width) / 0.012, 0.0, 1.0)
+    square = 1.0 / (1.0 + found.slope**2)  # the squared cosine of the flanks' angle
+    return square * (0.4 + 0.6 * depth) * (1.0 - 0.7 * np.clip(off_centre, 0.0, 1.0)) * (0.8 + 0.2 * stretch)
 
 
 def _best(found: _Candidates, segment: Segment, gripper: GripperShape, tuning: GraspTuning) -> tuple[GraspPose, ...]:
     """The best candidates, none within 12 mm and 25 degrees of a better one."""
+    tcp = np.column_stack([found.origin, found.tip + gripper.tip])
+    score, opening = _scores(found, segment, gripper), found.opening(gripper, tuning)
+    left = np.argsort(-score, kind="stable")
     kept: list[int] = []
-    for i in np.argsort(-found.score, kind="stable"):
-        alike = any(
-            np.linalg.norm(found.tcp[i] - found.tcp[k]) < 0.012
-            and abs(wrap_angle(found.yaw[i] - found.yaw[k], np.pi)) < np.radians(25)
-            for k in kept
-        )
-        if not alike:
-            kept.append(int(i))
-        if len(kept) == tuning.count:
-            break
+    while len(left) and len(kept) < tuning.count:
+        best = int(left[0])
+        kept.append(best)
+        turned = np.abs(np.mod(found.yaw[left] - found.yaw[best] + np.pi / 2, np.pi) - np.pi / 2)
+        away = np.linalg.norm(tcp[left] - tcp[best], axis=1)
+        left = left[(away >= 0.012) | (turned >= np.radians(25))]
     return tuple(
         GraspPose(
-            make_transform(top_down_rotation(_upright_yaw(found.yaw[i], found.tcp[i])), found.tcp[i]),
-            float(max(found.opening[i], gripper.min_opening)),
-            float(found.score[i]),
+            make_transform(top_down_rotation(_upright_yaw(found.yaw[i], tcp[i])), tcp[i]),
+            float(max(opening[i], gripper.min_opening)),
+            float(score[i]),
         )
         for i in kept
     )

@@ -6,7 +6,7 @@ small, a cap continues its pen. Objects that touch side by side, or lie on one a
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator
+from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
 from itertools import pairwise
 
@@ -32,6 +32,8 @@ TINY = 1.8e-4
 """m^2; a part, never an object."""
 ELONGATED = 2.4
 """Length over width from which end-to-end parts may make one tool, fruit or pen."""
+REACH = 8
+"""Cells from a crumb within which the object it belongs to is looked for."""
 STEP_SPAN = 2
 """Cells to either side of a border between which its step is measured."""
 WATER_LEVELS = (0.008, 0.012, 0.016, 0.024, 0.036, 0.050)
@@ -169,11 +171,21 @@ _RULES: tuple[Callable[[_Border], bool], ...] = (
 def merge_regions(labels: Labels, grid: HeightMap) -> Labels:
     """Merge neighbouring regions until no rule applies; the new labels."""
     graph = _Graph(labels, grid)
-    while pair := next((pair for rule in _RULES for pair, border in graph.borders() if rule(border)), None):
-        graph.merge(*pair)
+    while pairs := _agreeing(graph):
+        graph.merge(pairs)
     while pair := _parted(graph):
-        graph.merge(*pair)
+        graph.merge([pair])
+    while pair := _stray(graph):
+        graph.merge([pair])
     return graph.labels
+
+
+def _agreeing(graph: _Graph) -> list[tuple[int, int]]:
+    """All pairs that the surest applicable rule would merge; empty where none applies."""
+    for rule in _RULES:
+        if pairs := [pair for pair, border in graph.borders() if rule(border)]:
+            return pairs
+    return []
 
 
 def _parted(graph: _Graph) -> tuple[int, int] | None:
@@ -186,6 +198,19 @@ def _parted(graph: _Graph) -> tuple[int, int] | None:
     for pieces in beside.values():
         if len(pieces) > 1:
             return pieces[0], pieces[1]
+    return None
+
+
+def _stray(graph: _Graph) -> tuple[int, int] | None:
+    """A crumb beside an object: the end of a stem whose thin middle no camera saw. The object comes first."""
+    for label, region in graph.regions.items():
+        if region.area < TINY:
+            (top, left), (bottom, right) = region.cells.min(axis=0), region.cells.max(axis=0)
+            around = (slice(max(top - REACH, 0), bottom + REACH + 1), slice(max(left - REACH, 0), right + REACH + 1))
+            near = graph.labels[around]
+            others = near[(near > 0) & (near != label)]
+            if len(others):
+                return int(np.bincount(others).argmax()), label
     return None
 
 
@@ -208,15 +233,19 @@ class _Graph:
         }
         self._borders: list[tuple[tuple[int, int], _Border]] | None = None
 
-    def merge(self, keep: int, drop: int) -> None:
-        """Make one region of two neighbours."""
-        cells = np.concatenate([self.regions[keep].cells, self.regions.pop(drop).cells])
-        self.labels[cells[:, 0], cells[:, 1]] = keep
-        self._first[self._first == drop] = keep
-        self._second[self._second == drop] = keep
+    def merge(self, pairs: Sequence[tuple[int, int]]) -> None:
+        """Make one region of each chain of pairs; it keeps the chain's first number."""
+        kept = np.arange(self.labels.max() + 1)
+        for a, b in pairs:
+            kept[kept == kept[b]] = kept[a]
+        self._first, self._second = kept[self._first], kept[self._second]
+        for label in np.unique(kept[np.bincount(kept, minlength=len(kept))[kept] > 1]):
+            parts = [self.regions.pop(int(part)).cells for part in np.flatnonzero(kept == label)]
+            cells = np.concatenate(parts)
+            self.labels[cells[:, 0], cells[:, 1]] = label
+            self.regions[int(label)] = self._measure(cells, int(label))
         border = self._first != self._second
         self._first, self._second, self._step = self._first[border], self._second[border], self._step[border]
-        self.regions[keep] = self._measure(cells, keep)
         self._borders = None
 
     def borders(self) -> list[tuple[tuple[int, int], _Border]]:
