@@ -66,7 +66,7 @@ PHRASES: PhraseTable[Meaning] = PhraseTable(
 DETERMINERS = frozenset(spelt("a | an | the | this | that | these | those | any", True))
 PRONOUNS = frozenset(spelt("it | them | this | that | these | those", True))
 _LONGEST = 160
-_LONGEST = 160
+"""Characters of a noun phrase."""
 _SAID_AS: dict[Meaning, str] = {Mark.ONTO: "on", Mark.INTO: "in", Mark.OFF: "on", Mark.OUT_OF: "in"}
 
 
@@ -77,33 +77,41 @@ def noun_phrase(words: Sequence[str]) -> str:
     and NeedsLanguageModel for one that is no description by looks and places.
     """
     refuse_what_names_no_object(words)
-    said: list[str] = ["any"] if list(words[:1]) == ["any"] or list(words[:3]) == ["one", "of", "the"] else []
-    named, after = False, None
+    anyone = list(words[:1]) == ["any"] or list(words[:3]) == ["one", "of", "the"]
+    phrase = " ".join([*(["any"] if anyone else []), *_spelling(words)])
+    if len(phrase) > _LONGEST:
+        raise UnclearInstruction(f"{quote(words)} is too long for one object: describe it in {_LONGEST} characters.")
+    return phrase
+
+
+def _spelling(words: Sequence[str]) -> list[str]:
+    said: list[str] = []
+    named = False  # a noun may have been said; relations and positions need one before them
+    relative = False  # "that is" has just been said
     for phrase, meaning in scan(PHRASES, _without_article(words)):
-        if isinstance(meaning, Pick) and named:
-            said += phrase
-        elif meaning is Mark.RELATIVE and named and after is None:
-            after = meaning
-            continue
-        elif meaning is not None and named:
-            said += _relation(meaning, words)
-            named = False
-        elif meaning is not None:
-            raise UnclearInstruction(f"{quote(words)} doesn't say which object: a noun is missing.")
-        elif after is Mark.RELATIVE:
+        if meaning is None and relative:
             raise NeedsLanguageModel(f"{quote(words)} describes an object by more than its looks and place.")
-        elif phrase[0] not in DETERMINERS:
+        if meaning is None and phrase[0] in DETERMINERS:
+            if named:
+                raise NeedsLanguageModel(f"{quote(words)} is no name of one object.")
+        elif meaning is None:
             said += phrase
             named = True
-        elif named:
-            raise NeedsLanguageModel(f"{quote(words)} is no name of one object.")
-        after = None
-    if not named or after is not None:
-        raise UnclearInstruction(f"{quote(words)} doesn't say which object: a noun is missing.")
-    phrase_said = " ".join(said)
-    if len(phrase_said) > _LONGEST:
-        raise UnclearInstruction(f"{quote(words)} is too long for one object: describe it in {_LONGEST} characters.")
-    return phrase_said
+        elif not named or (relative and meaning is Mark.RELATIVE):
+            raise _missing_noun(words)
+        elif isinstance(meaning, Pick):
+            said += phrase
+        elif meaning is not Mark.RELATIVE:
+            said += _relation(meaning, words)
+            named = False
+        relative = meaning is Mark.RELATIVE
+    if not named or relative:
+        raise _missing_noun(words)
+    return said
+
+
+def _missing_noun(words: Sequence[str]) -> UnclearInstruction:
+    return UnclearInstruction(f"{quote(words)} doesn't say which object: a noun is missing.")
 
 
 def _without_article(words: Sequence[str]) -> list[str]:
