@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from functools import cache
 from pathlib import Path
 
@@ -159,8 +160,8 @@ def test_relative_clauses_nest() -> None:
         ("bananna", "Did you mean 'banana'"),
         ("gren pepper", "Did you mean 'green'"),
         ("banana", "No banana is in view. Seen: green pepper"),
-        ("pepper", "3 objects fit 'pepper'.*'the middle one'"),
-        ("red pepper", "2 objects fit 'red pepper'.*'the left one', 'the right one'"),
+        ("pepper", "3 objects fit 'pepper'.*'the middle pepper'"),
+        ("red pepper", "2 objects fit 'red pepper'.*'the left red pepper', 'the right red pepper'"),
         ("peppers", "several"),
         ("middle red pepper", "2 objects fit"),
         ("fourth pepper", "No fourth pepper"),
@@ -181,6 +182,15 @@ def test_what_it_cannot_ground_it_says(phrase: str, complaint: str) -> None:
 def test_different_names_are_offered_where_they_help() -> None:
     with pytest.raises(DetectionFailure, match="'the small red block', 'the small blue block'"):
         LEXICON.ground("block", [block("red"), block("blue", xy=(0.3, 0.2))], VIEW)
+
+
+@pytest.mark.parametrize("phrase", ["pepper", "red pepper", "thing", "pepper that is next to the plate"])
+def test_what_is_offered_is_understood(phrase: str) -> None:
+    segments = [*ROW, pepper(xy=(0.15, 0.32), yaw=1.5)]
+    with pytest.raises(DetectionFailure) as failure:
+        LEXICON.ground(phrase, segments, VIEW)
+    offers = re.findall("'([^']*)'", str(failure.value).split("Say which:")[1])
+    assert len({LEXICON.ground(offer, segments, VIEW) for offer in offers}) == len(offers) >= 2
 
 
 def test_an_empty_table_is_called_empty() -> None:

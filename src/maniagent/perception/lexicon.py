@@ -142,13 +142,14 @@ class Lexicon:
         self, reference: Reference, segments: Sequence[Segment], looks: Sequence[Appearance], viewpoint: Viewpoint
     ) -> int:
         scores = [self._score(reference, look) for look in looks]
-        best = max(scores, default=0.0)
-        among = [i for i, score in enumerate(scores) if score >= max(FLOOR, best - MARGIN)]
+        among = [i for i, score in enumerate(scores) if score >= FLOOR]
         if reference.where is not None:
             landmark = None
             if reference.landmark is not None:
                 landmark = self._ground(reference.landmark, segments, looks, viewpoint)
             among = by_relation(segments, among, viewpoint, reference.where, landmark)
+        best = max((scores[i] for i in among), default=0.0)
+        among = [i for i in among if scores[i] >= best - MARGIN]
         for size in reference.sizes:
             among = by_size(segments, among, size)
         if reference.pick is not None or reference.ordinal is not None:
@@ -175,7 +176,8 @@ class Lexicon:
             places = np.array([segments[i].centre[:2] for i in among])
             across = np.ptp(places @ viewpoint.right) >= np.ptp(places @ viewpoint.away)
             sides = ("left", "right") if across else ("nearest", "farthest")
-            ways = [f"the {side} one" for side in ([*sides, "middle"] if len(among) == 3 else sides)]
+            thing = " ".join([*reference.colours, reference.noun])
+            ways = [f"the {side} {thing}" for side in ([*sides, "middle"] if len(among) == 3 else sides)]
         listed = ", ".join(f"'{way}'" for way in ways)
         return f"{len(among)} objects fit '{reference.phrase}' equally well. Say which: {listed}."
 
