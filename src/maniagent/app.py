@@ -54,11 +54,13 @@ def run(
     Raises
     ------
     UsageError
-        For an unknown task, a bad scene file, or nothing to do.
+        For an unknown task, a bad scene file, a negative seed, or nothing to do.
     SetupError
         Where nothing renders offscreen.
 
     """
+    if seed < 0:
+        raise UsageError(f"The seed is {seed}; it should be 0 or more.")
     chosen = _choose(task, scene)
     name = chosen.name if task is not None else None
     folder = Path(out) if out is not None else None

@@ -66,9 +66,9 @@ class _Binder:
         position = self._target(step, rotation)
         if step.carrying is not None:
             position = self._tcp_that_brings(step.carrying, position, rotation)
-        if not np.isfinite(position).all():
-            raise FormatFailure(f"{self._step}: the target is not a finite point.")
         pose = make_transform(rotation, position)
+        if not np.isfinite(pose).all():
+            raise FormatFailure(f"{self._step}: the target is not a finite pose.")
         held = None if self._taken is None else self._taken[0]
         mentioned = self._mentioned(step)
         opening = None

@@ -55,20 +55,26 @@ class AgentLoop:
         self._agents = agents
         self._log = log
         self._budget = budget
+        self._run: _Run | None = None
+        robot.on_move(self._tell_move)
 
     def run(self, instruction: str) -> RunResult:
         """Carry out an instruction; never raises a StageFailure. KeyboardInterrupt stops the arm and is raised on."""
-        run = _Run(self._robot, self._agents, self._log, self._budget, instruction)
+        self._run = run = _Run(self._robot, self._agents, self._log, self._budget, instruction)
         try:
             verdict, reason = run.until_the_end()
+            with run.timed("execution"):
+                home = self._robot.go_home()
         except BaseException:
             self._robot.stop()
             raise
-        with run.timed("execution"):
-            home = self._robot.go_home()
         if not home.completed:
             reason += f" The arm did not get home: {home.reason}"
         return RunResult(instruction, verdict, reason, run.memory.records, dict(run.seconds))
+
+    def _tell_move(self, description: str, seconds: float) -> None:
+        turn = self._run.turn if self._run is not None else 0
+        self._log.emit("move", turn=turn, description=description, seconds=seconds)
 
 
 class _Run:
@@ -79,21 +85,20 @@ class _Run:
         self.memory = Memory()
         self.seconds: defaultdict[str, float] = defaultdict(float)
         self._start = time.monotonic()
-        self._turn = 0
+        self.turn = 0
         self._failed_looks = 0
-        robot.on_move(lambda what, took: log.emit("move", turn=self._turn, description=what, seconds=took))
 
     def until_the_end(self) -> tuple[RunVerdict, str]:
         """Take turns until the agents are done, give up, or run out of budget."""
-        while self._turn < self.budget.turns:
-            self._turn += 1
+        while self.turn < self.budget.turns:
+            self.turn += 1
             if time.monotonic() - self._start > self.budget.seconds:
                 return RunVerdict.OUT_OF_BUDGET, f"The run took longer than its {self.budget.seconds:.0f} s."
             try:
                 end = self._take_turn()
                 self._failed_looks = 0
             except StageFailure as failure:
-                self.log.emit("failed", turn=self._turn, stage=str(failure.stage), reason=str(failure))
+                self.log.emit("failed", turn=self.turn, stage=str(failure.stage), reason=str(failure))
                 self._failed_looks += 1
                 if self._failed_looks >= self.budget.failed_looks:
                     return RunVerdict.CANNOT, str(failure)
@@ -104,7 +109,7 @@ class _Run:
 
     def _take_turn(self) -> tuple[RunVerdict, str] | None:
         """One turn; the verdict where it was the last. Raises StageFailure where nothing could be attempted."""
-        turn = self._turn
+        turn = self.turn
         with self.timed("observe"):
             observation = self.robot.observe()
         self.log.emit("observed", turn=turn, observation=observation)
@@ -128,13 +133,13 @@ class _Run:
         try:
             with self.timed("detection"):
                 located = self.agents.objects.locate(subtask, observation, self.memory)
-            self.log.emit("located", turn=self._turn, objects=located.objects, detections=located.detections)
+            self.log.emit("located", turn=self.turn, objects=located.objects, detections=located.detections)
             boxes = {info.index: info.box for info in (*located.objects, *located.surroundings)}
             objects, keypoints = self._plan(subtask, located, boxes, Viewpoint.of(observation))
         except CameraFailure:
             raise
         except StageFailure as failure:
-            self.log.emit("failed", turn=self._turn, stage=str(failure.stage), reason=str(failure))
+            self.log.emit("failed", turn=self.turn, stage=str(failure.stage), reason=str(failure))
             report = ExecutionReport(completed=False, reached=0, reason=str(failure), stage=str(failure.stage))
             self.memory.add(SubtaskRecord(subtask.text, located.objects, report, queries=subtask.objects))
             return
@@ -143,9 +148,9 @@ class _Run:
             home = self.robot.go_home()
         if report.completed and not home.completed:
             report = home
-        self.log.emit("executed", turn=self._turn, report=report)
+        self.log.emit("executed", turn=self.turn, report=report)
         if not report.completed:
-            self.log.emit("failed", turn=self._turn, stage=report.stage, reason=report.reason)
+            self.log.emit("failed", turn=self.turn, stage=report.stage, reason=report.reason)
         self.memory.add(SubtaskRecord(subtask.text, objects, report, queries=subtask.objects))
 
     def _plan(
@@ -166,9 +171,9 @@ class _Run:
                 feedback = str(failure)
                 if not answers_left:
                     raise
-                self.log.emit("failed", turn=self._turn, stage=str(failure.stage), reason=feedback)
+                self.log.emit("failed", turn=self.turn, stage=str(failure.stage), reason=feedback)
             else:
-                self.log.emit("planned", turn=self._turn, sequence=sequence, keypoints=keypoints)
+                self.log.emit("planned", turn=self.turn, sequence=sequence, keypoints=keypoints)
                 return objects, keypoints
         raise FormatFailure(feedback)
 

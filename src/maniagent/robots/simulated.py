@@ -52,6 +52,18 @@ class SimulatedArm:
         self._env.advance(self._env.robot_state().joint_positions, self._last_opening)
 
 
+class BodyFilter:
+    """Which points lie on the arm, by its kinematics. Made for agents: from here no way leads to the simulation."""
+
+    def __init__(self, model: ArmModel, margin: float = SELF_MARGIN) -> None:
+        self._model = model
+        self._margin = margin
+
+    def __call__(self, points: NDArray[np.float32], state: RobotState) -> BoolArray:
+        """Which of the points (N, 3), base frame, lie on the robot itself: (N,) bool."""
+        return self._model.covers(points, state.joint_positions, state.gripper_opening, self._margin)
+
+
 class SimulatedRobot:
     """A `Robot` in the tabletop twin. What it hands out is what a real robot could know, and nothing else."""
 
@@ -66,10 +78,9 @@ class SimulatedRobot:
         self._on_frame = on_frame
         self._next_frame = 0.0
         self._move_hooks: list[Callable[[str, float], None]] = []
-        self._model = ArmModel()
-        self._motion = MotionStack(
-            SimulatedArm(env), limits, self._model, on_tick=self._after_tick, on_move=self._announce
-        )
+        model = ArmModel()
+        self.covers = BodyFilter(model)
+        self._motion = MotionStack(SimulatedArm(env), limits, model, on_tick=self._after_tick, on_move=self._announce)
 
     def observe(self) -> Observation:
         """Noisy pictures from all cameras, and the encoders."""
@@ -90,10 +101,6 @@ class SimulatedRobot:
     def stop(self) -> None:
         """Stand still."""
         self._motion.arm.stop()
-
-    def covers(self, points: NDArray[np.float32], state: RobotState) -> BoolArray:
-        """Which of the points (N, 3), base frame, lie on the robot itself."""
-        return self._model.covers(points, state.joint_positions, state.gripper_opening, SELF_MARGIN)
 
     def on_move(self, hook: Callable[[str, float], None]) -> None:
         """Call `hook(description, seconds)` when a move begins."""

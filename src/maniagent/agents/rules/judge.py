@@ -16,6 +16,10 @@ AT_TOLERANCE = 0.025
 SEARCH = 0.25
 """m around its old place within which a thing that shouldn't have moved (a plate) is looked for."""
 ANGLE_TOLERANCE = np.radians(20)
+SQUARE = 1.15
+"""Length over width below which nobody can tell how a thing is turned."""
+STILL = 0.02
+"""m within which a thing counts as not moved."""
 BESIDE_REACH = 0.12
 """m from the border of a thing that still counts as beside it."""
 
@@ -33,11 +37,11 @@ def judge(command: Command, record: SubtaskRecord, now: Sequence[ObjectInfo]) ->
     if command.action is Action.PICK_UP:
         return _judge_pick_up(record, moved, now)
     if command.action is Action.ROTATE:
-        return _judge_rotation(command, moved, now)
+        return _judge_rotation(command, record, moved, now)
     if command.point is not None:
-        return _judge_place(moved, now, np.asarray(command.point))
+        return _judge_place(record, moved, now, np.asarray(command.point))
     if command.distance is not None:
-        return _judge_shift(moved, now, command.distance)
+        return _judge_shift(record, moved, now, command.distance)
     return _judge_relation(command, record, moved, now)
 
 
@@ -47,39 +51,47 @@ def _failed(record: SubtaskRecord, seen: str) -> Judgement:
 
 
 def _judge_pick_up(record: SubtaskRecord, moved: ObjectInfo, now: Sequence[ObjectInfo]) -> Judgement:
-    if find_again(moved, now, 0.05) is not None:
+    low = [thing for thing in now if thing.top_z < moved.top_z + 0.05]  # the gripper may hold it up above its old place
+    if find_again(moved, low, 0.05) is not None:
         return _failed(record, f"The {moved.name} still lies where it was.")
     if not record.outcome.completed:
         return _failed(record, f"The {moved.name} was not lifted.")
     return Verdict.SUCCESS, f"The {moved.name} is in the gripper."
 
 
-def _judge_rotation(command: Command, moved: ObjectInfo, now: Sequence[ObjectInfo]) -> Judgement:
+def _judge_rotation(command: Command, record: SubtaskRecord, moved: ObjectInfo, now: Sequence[ObjectInfo]) -> Judgement:
     seen = find_again(moved, now, 0.08)
     if seen is None:
-        return Verdict.FAILURE, f"The {moved.name} is not where it was turned."
-    off = wrap_angle(seen.yaw - moved.yaw - (command.angle or 0.0), np.pi)
-    if abs(off) <= ANGLE_TOLERANCE:
-        return Verdict.SUCCESS, f"The {moved.name} is turned as told, to {np.degrees(abs(off)):.0f} degrees."
-    return Verdict.FAILURE, f"The {moved.name} is {np.degrees(abs(off)):.0f} degrees off."
+        return _failed(record, f"The {moved.name} is not where it was turned.")
+    angle = command.angle or 0.0
+    if abs(wrap_angle(angle, np.pi)) <= ANGLE_TOLERANCE or moved.extent[0] < SQUARE * moved.extent[1]:
+        if record.outcome.completed:
+            return Verdict.SUCCESS, f"The arm turned the {moved.name}, which looks the same as before."
+        return _failed(record, f"The {moved.name} was not turned.")
+    off = abs(wrap_angle(seen.yaw - moved.yaw - angle, np.pi))
+    if off <= ANGLE_TOLERANCE:
+        return Verdict.SUCCESS, f"The {moved.name} is turned as told, to {np.degrees(off):.0f} degrees."
+    return _failed(record, f"The {moved.name} is {np.degrees(off):.0f} degrees off.")
 
 
-def _judge_place(moved: ObjectInfo, now: Sequence[ObjectInfo], expected: FloatArray) -> Judgement:
+def _judge_place(
+    record: SubtaskRecord, moved: ObjectInfo, now: Sequence[ObjectInfo], expected: FloatArray
+) -> Judgement:
     alike = [thing for thing in now if same_thing(moved, thing)]
     if not alike:
-        return Verdict.FAILURE, f"The {moved.name} is out of view."
+        return _failed(record, f"The {moved.name} is out of view.")
     off = min(float(np.linalg.norm(thing.centre[:2] - expected)) for thing in alike)
-    verdict = Verdict.SUCCESS if off <= AT_TOLERANCE else Verdict.FAILURE
-    return verdict, f"The {moved.name} lies {off * 100:.1f} cm from ({expected[0]:.2f}, {expected[1]:.2f})."
+    seen = f"The {moved.name} lies {off * 100:.1f} cm from ({expected[0]:.2f}, {expected[1]:.2f})."
+    return (Verdict.SUCCESS, seen) if off <= AT_TOLERANCE else _failed(record, seen)
 
 
-def _judge_shift(moved: ObjectInfo, now: Sequence[ObjectInfo], distance: float) -> Judgement:
+def _judge_shift(record: SubtaskRecord, moved: ObjectInfo, now: Sequence[ObjectInfo], distance: float) -> Judgement:
     seen = find_again(moved, now, distance + 0.10)
     if seen is None:
-        return Verdict.FAILURE, f"The {moved.name} is out of view."
+        return _failed(record, f"The {moved.name} is out of view.")
     went = float(np.linalg.norm(seen.centre[:2] - moved.centre[:2]))
-    verdict = Verdict.SUCCESS if abs(went - distance) <= AT_TOLERANCE else Verdict.FAILURE
-    return verdict, f"The {moved.name} moved by {went * 100:.1f} cm."
+    evidence = f"The {moved.name} moved by {went * 100:.1f} cm."
+    return (Verdict.SUCCESS, evidence) if abs(went - distance) <= AT_TOLERANCE else _failed(record, evidence)
 
 
 def _judge_relation(command: Command, record: SubtaskRecord, moved: ObjectInfo, now: Sequence[ObjectInfo]) -> Judgement:
@@ -87,9 +99,14 @@ def _judge_relation(command: Command, record: SubtaskRecord, moved: ObjectInfo, 
     target = find_again(record.objects[1], now, SEARCH) or record.objects[1]
     holds = _rests_on if command.relation in (Relation.ON, Relation.IN) else _lies_beside
     where = f"{command.relation} the {target.name}"
-    for thing in now:
-        if same_thing(moved, thing) and not _is(thing, target) and holds(thing, moved, target):
-            return Verdict.SUCCESS, f"A look at the table shows the {moved.name} {where}."
+    alike = [thing for thing in now if same_thing(moved, thing) and not _is(thing, target)]
+    there = [holds(thing, moved, target) for thing in alike]
+    if any(_is_unmoved(thing, moved) for thing, arrived in zip(alike, there, strict=True) if not arrived):
+        return _failed(record, f"The {moved.name} still lies where it was.")  # another like it may be there already
+    if holds is _lies_beside and not record.outcome.completed:
+        return _failed(record, f"The {moved.name} was not put {where}.")  # on which side of it, the look doesn't say
+    if any(there):
+        return Verdict.SUCCESS, f"A look at the table shows the {moved.name} {where}."
     if holds is _rests_on and _is_hidden_below(moved, target, now):
         return Verdict.SUCCESS, f"A look at the table shows the {moved.name} {where}, hiding it."
     return _failed(record, f"No {moved.name} is seen {where}.")
@@ -97,6 +114,11 @@ def _judge_relation(command: Command, record: SubtaskRecord, moved: ObjectInfo, 
 
 def _is(a: ObjectInfo, b: ObjectInfo) -> bool:
     return a is b or (float(np.linalg.norm(a.centre - b.centre)) < 1e-6)
+
+
+def _is_unmoved(thing: ObjectInfo, moved: ObjectInfo) -> bool:
+    """Whether a thing that looks like the one that was to be moved lies where that was."""
+    return float(np.linalg.norm(thing.centre - moved.centre)) < STILL
 
 
 def _rests_on(thing: ObjectInfo, moved: ObjectInfo, target: ObjectInfo) -> bool:

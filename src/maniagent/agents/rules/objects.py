@@ -6,7 +6,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...errors import FailureStage, GraspFailure
+from ...errors import DetectionFailure, FailureStage, GraspFailure
 from ...geometry import FloatArray
 from ...perception.grasps import GRIPPER, propose_grasps
 from ...perception.identity import find_again
@@ -48,6 +48,8 @@ class RulesObjectAgent:
         viewpoint = Viewpoint.of(observation)
         attempts = memory.attempts(subtask.text)
         chosen = [self._find(i, query, view, viewpoint, attempts) for i, query in enumerate(subtask.objects)]
+        if len(set(chosen)) < len(chosen):
+            raise DetectionFailure(f"{' and '.join(map(repr, subtask.objects))} mean the same thing.")
         command = parse_instruction(subtask.text)[0]
         grasps = _grasps(view.segments[chosen[0]], view, command, viewpoint, attempts)
         names = subtask.objects

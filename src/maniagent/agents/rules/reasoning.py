@@ -26,9 +26,10 @@ class RulesReasoningAgent:
             return Subtask(previous=Verdict.INITIAL, reason=str(failure), cannot=True)
         done = sum(record.verdict is Verdict.SUCCESS for record in memory)
         verdict, evidence = Verdict.INITIAL, "This is the first sub-task."
-        if memory.last is not None:
-            current = commands[done]
-            verdict, evidence = judge(current, memory.last, scene.objects)
+        if memory.last is not None and memory.last.verdict is Verdict.SUCCESS:  # judged before; nothing tried since
+            verdict, evidence = memory.last.verdict, memory.last.evidence
+        elif memory.last is not None:
+            verdict, evidence = judge(commands[done], memory.last, scene.objects)
             done += verdict is Verdict.SUCCESS
         if done == len(commands):
             return Subtask(previous=verdict, reason=evidence, done=True)
