@@ -161,8 +161,12 @@ class ObjectInfo:
     """Median RGB, 0 to 255."""
     grasps: tuple[GraspPose, ...] = ()
     """Best first; empty where the object can't be grasped or no grasp was asked for."""
+    free_spot: FloatArray | None = None
+    """(2,) m, base frame: the middle of what is free of its upper side; None where nothing lies on it yet."""
 
     def __post_init__(self) -> None:
+        if self.free_spot is not None:
+            object.__setattr__(self, "free_spot", _frozen(self.free_spot, (2,), np.float64, "free_spot"))
         object.__setattr__(self, "centre", _frozen(self.centre, (3,), np.float64, "centre"))
         object.__setattr__(self, "extent", _frozen(self.extent, (3,), np.float64, "extent"))
 
@@ -265,7 +269,7 @@ class Part(enum.StrEnum):
     GRASP = "grasp"
     """Where its best grasp puts the TCP."""
     SURFACE = "surface"
-    """Middle of the object at the height where a thing put onto it comes to rest."""
+    """Middle of the object's upper side, or of what is still free of it, where a thing put onto it comes to rest."""
     TOP = "top"
     """Middle of the object at the height of its highest point."""
     BASE = "base"

@@ -119,7 +119,8 @@ class _Binder:
             case Part.GRASP:
                 return self._grasp_of(anchor.index).T_base_grasp[:3, 3]
             case Part.SURFACE:
-                return np.array([x, y, thing.surface_z])
+                spot = thing.centre[:2] if thing.free_spot is None else thing.free_spot
+                return np.array([*spot, thing.surface_z])
             case Part.TOP:
                 return np.array([x, y, thing.top_z])
             case Part.BASE:

@@ -46,9 +46,9 @@ class CameraSpec:
         return float(np.degrees(2 * np.arctan2(self.height / 2, self.focal_length)))
 
 
-MAIN_CAMERA = CameraSpec("main", eye=(0.74, 0.0, 0.54), target=(0.26, 0.0, 0.0))
+MAIN_CAMERA = CameraSpec("main", eye=(0.68, 0.0, 0.62), target=(0.26, 0.0, 0.0))
 """In front of the table and above it, looking back at the robot: what the person who instructs sees."""
-SIDE_CAMERA = CameraSpec("side", eye=(0.24, -0.56, 0.54), target=(0.27, 0.0, 0.0))
+SIDE_CAMERA = CameraSpec("side", eye=(0.24, -0.47, 0.60), target=(0.27, 0.0, 0.0))
 """At the robot's right."""
 
 

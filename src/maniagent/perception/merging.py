@@ -117,7 +117,7 @@ def _shaded_side(border: _Border) -> bool:
 def _limb(border: _Border) -> bool:
     """Head and body: of one colour, side by side, whatever their heights. What stands ON a thing has no outer side."""
     one_colour = border.same_colour or (border.same_hue and border.colourful)
-    beside = border.share > 0.2 and border.outer > 0.25 * border.perimeter
+    beside = border.share > 0.1 and border.outer > 0.25 * border.perimeter
     return one_colour and beside and not border.lies_on_cloth
 
 

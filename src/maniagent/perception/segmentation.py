@@ -159,6 +159,7 @@ def _cut(
     all_points = np.concatenate([view.points for view in views])
     all_colours = np.concatenate([view.colours for view in views])
     all_labels = np.concatenate(pixel_labels)
+    carriers = {below for _, below in supports.values() if below}
     segments = []
     for label, (level, _) in supports.items():
         if np.count_nonzero(labels == label) * grid.cell**2 < MIN_OBJECT_AREA:
@@ -172,5 +173,16 @@ def _cut(
             mask = np.zeros(view.shape, bool)
             mask.ravel()[view.pixels[of_pixel == label]] = True
             masks[view.name] = mask
-        segments.append(Segment(all_points[chosen], all_colours[chosen], level, masks))
+        spot = _free_spot(labels == label, grid) if label in carriers else None
+        segments.append(Segment(all_points[chosen], all_colours[chosen], level, masks, spot))
     return segments
+
+
+def _free_spot(free: BoolArray, grid: HeightMap) -> NDArray[np.float64]:
+    """(2,) m, base frame: the point of a partly covered surface that is farthest from everything else."""
+    level = np.median(grid.height[free])
+    # Off the level of the surface is its rim.
+    surface = free & (np.abs(grid.height - level) < 0.006)
+    distance = cv2.distanceTransform(surface.astype(np.uint8), cv2.DIST_L2, 3)
+    row, column = np.unravel_index(int(distance.argmax()), distance.shape)
+    return grid.positions(np.asarray(row), np.asarray(column))

@@ -36,6 +36,8 @@ class Segment:
     """m, base frame: height of what the object stands on; cameras above never see an underside."""
     masks: Mapping[str, BoolArray] = field(default_factory=dict)
     """By view: (H, W), True where the object is seen."""
+    free_spot: FloatArray | None = None
+    """(2,) m, base frame: the middle of what is free of its upper side; None where nothing lies on it."""
 
     @cached_property
     def _footprint(self) -> _Footprint:
@@ -84,4 +86,6 @@ class Segment:
 
     def to_object(self, index: int, name: str, grasps: tuple[GraspPose, ...] = ()) -> ObjectInfo:
         """The segment as a named, numbered object."""
-        return ObjectInfo(index, name, self.centre, self.extent, self.yaw, self.surface_z, self.colour, grasps)
+        return ObjectInfo(
+            index, name, self.centre, self.extent, self.yaw, self.surface_z, self.colour, grasps, self.free_spot
+        )

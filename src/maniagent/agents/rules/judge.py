@@ -98,7 +98,7 @@ def _judge_relation(command: Command, record: SubtaskRecord, moved: ObjectInfo, 
     # The target is looked for near its old place; where it is hidden now (a block under a block), its old place counts.
     target = find_again(record.objects[1], now, SEARCH) or record.objects[1]
     holds = _rests_on if command.relation in (Relation.ON, Relation.IN) else _lies_beside
-    where = f"{command.relation} the {target.name}"
+    where = f"{command.relation} the {record.objects[1].name}"
     alike = [thing for thing in now if same_thing(moved, thing) and not _is(thing, target)]
     there = [holds(thing, moved, target) for thing in alike]
     if any(_is_unmoved(thing, moved) for thing, arrived in zip(alike, there, strict=True) if not arrived):

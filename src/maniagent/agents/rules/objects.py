@@ -91,8 +91,9 @@ def _grasps(
         raise GraspFailure(f"No grasp was found for the {command.object}: {why}.")
     if command.action in (Action.DRAG, Action.PUSH):
         grasps = _leading_first(grasps, segment, direction_of(command, segment.centre[:2], viewpoint))
-    slipped = sum(record.outcome.stage == FailureStage.GRASP for record in attempts) % len(grasps)
-    return grasps[slipped:] + grasps[:slipped]
+    spoiled = (FailureStage.GRASP, FailureStage.CONTROL)
+    tried = sum(record.outcome.stage in spoiled for record in attempts) % len(grasps)
+    return grasps[tried:] + grasps[:tried]
 
 
 def _leading_first(grasps: tuple[GraspPose, ...], segment: Segment, direction: FloatArray) -> tuple[GraspPose, ...]:
