@@ -70,14 +70,14 @@ def look_at(eye: ArrayLike, target: ArrayLike) -> FloatArray:
     """T_base_camera of a camera at `eye` that looks at `target`, upright (base z points up in the image).
 
     OpenCV camera axes: x right, y down, z forward. Raises ValueError where the view is vertical, because then
-    "upright" means nothing.
+    "upright" means nothing, and where the target is the eye itself.
     """
     eye, target = np.asarray(eye, float), np.asarray(target, float)
     forward = target - eye
-    forward /= np.linalg.norm(forward)
     right = np.cross(forward, [0.0, 0.0, 1.0])
-    if np.linalg.norm(right) < 1e-9:
+    if np.linalg.norm(right) <= 1e-9 * np.linalg.norm(forward):
         raise ValueError("look_at needs a direction that is not vertical")
+    forward /= np.linalg.norm(forward)
     right /= np.linalg.norm(right)
     down = np.cross(forward, right)
     return make_transform(np.stack([right, down, forward], axis=1), eye)

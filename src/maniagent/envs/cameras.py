@@ -87,6 +87,7 @@ class DepthNoise:
 
     def colour(self, clean: NDArray[np.uint8], rng: np.random.Generator) -> NDArray[np.uint8]:
         """A noisy copy of an RGB image (H, W, 3), a little out of focus as through any lens."""
-        clean = np.asarray(cv2.GaussianBlur(clean, (0, 0), self.blur), np.uint8)
+        if self.blur > 0:
+            clean = np.asarray(cv2.GaussianBlur(clean, (0, 0), self.blur), np.uint8)
         noise = rng.standard_normal(clean.shape, dtype=np.float32) * np.float32(self.colour_sigma)
-        return np.clip(clean + noise, 0, 255).astype(np.uint8)
+        return np.clip(np.rint(clean + noise), 0, 255).astype(np.uint8)

@@ -22,6 +22,7 @@ from .objects import ObjectModel, make_object, object_names
 Metres = Annotated[float, Field(allow_inf_nan=False, ge=-2.0, le=2.0)]
 Degrees = Annotated[float, Field(allow_inf_nan=False, ge=-360.0, le=360.0)]
 Name = Annotated[str, Field(pattern=r"^[a-z][a-z0-9_]{0,39}$")]
+Param = bool | int | float | str
 
 REACH_RADIUS = (0.19, 0.42)
 """m from the base axis, within which a top-down grasp at table height is always possible."""
@@ -29,6 +30,10 @@ REACH_Y = (-0.24, 0.24)
 REACH_X = (0.15, 0.40)
 CLEARANCE = 0.025
 """m kept free between objects, so that the fingers fit between them."""
+DRAWS = 5000
+"""Poses drawn before a scene is given up: half a second of trying."""
+DRAWS_EACH = 40
+"""Poses drawn for one object before the whole layout is begun afresh."""
 
 
 class _Data(BaseModel):
@@ -75,7 +80,7 @@ class SceneObject(_Data):
     name: Name
     kind: str
     """A name from the object library (`maniagent gallery` shows them)."""
-    params: Mapping[str, Any] = {}
+    params: Mapping[str, Param | tuple[Param, ...]] = {}
     """Passed to the library, e.g. {size: 0.03, colour: yellow} for a block."""
     place: Place = Place()
 
@@ -85,6 +90,15 @@ class SceneObject(_Data):
         if kind not in object_names():
             raise ValueError(f"no object kind {kind!r}; the library has {', '.join(object_names())}")
         return kind
+
+    @model_validator(mode="after")
+    def _can_be_made(self) -> Self:
+        if self.params:  # without any, nothing can be wrong, and making one takes its time
+            try:
+                self.model()
+            except UsageError as error:
+                raise ValueError(str(error)) from error
+        return self
 
     def model(self) -> ObjectModel:
         """The library's model of it."""
@@ -109,13 +123,22 @@ class Scene(_Data):
         return self
 
 
+class _Loader(yaml.SafeLoader):
+    """Safe YAML in which `on` is a word, as in YAML 1.2, not a boolean: scenes put things `on` things."""
+
+    yaml_implicit_resolvers = {  # noqa: RUF012 - PyYAML's own declaration
+        first: [(tag, form) for tag, form in resolvers if not (first in "oO" and tag == "tag:yaml.org,2002:bool")]
+        for first, resolvers in yaml.SafeLoader.yaml_implicit_resolvers.items()
+    }
+
+
 def read_yaml(path: Path) -> dict[str, Any]:
     """The mapping a YAML file holds; UsageError where there is none, naming file and line."""
     try:
-        data = yaml.safe_load(path.read_text(encoding="utf-8"))
+        data = yaml.load(path.read_text(encoding="utf-8"), _Loader)  # noqa: S506 - a SafeLoader
     except OSError as error:
         raise UsageError(f"Can't read {path}: {error.strerror or error}.") from error
-    except (yaml.YAMLError, UnicodeDecodeError) as error:
+    except (yaml.YAMLError, ValueError) as error:  # ValueError: bytes that are no text, dates that don't exist
         raise UsageError(f"{path} is not valid YAML: {error}") from error
     if not isinstance(data, dict):
         raise UsageError(f"{path} should hold a mapping (docs/scenes.md shows one), not {type(data).__name__}.")
@@ -124,7 +147,13 @@ def read_yaml(path: Path) -> dict[str, Any]:
 
 def describe_validation(error: ValidationError) -> str:
     """A pydantic error as one line: where, what."""
-    return "; ".join(f"{'.'.join(map(str, e['loc'])) or 'file'}: {e['msg']}" for e in error.errors()[:5])
+    errors = error.errors()
+    # A list with a bad item counts as too short as well; the item alone is worth telling.
+    outer = {e["loc"][:depth] for e in errors for depth in range(len(e["loc"]))}
+    return "; ".join(
+        f"{'.'.join(map(str, e['loc'])) or 'file'}: {e['msg'].removeprefix('Value error, ')}"
+        for e in [e for e in errors if e["loc"] not in outer][:5]
+    )
 
 
 @dataclass(frozen=True)
@@ -141,6 +170,11 @@ class Placement:
     """m, height of the body origin."""
     on: str | None = None
 
+    @property
+    def half_diagonal(self) -> float:
+        """m, from the middle of the footprint to its corners."""
+        return float(np.hypot(*self.model.extent[:2])) / 2
+
     def corners(self, margin: float = 0.0) -> FloatArray:
         """(4, 2) corners of the footprint, grown by `margin`, counter-clockwise."""
         half = np.asarray(self.model.extent[:2]) / 2 + margin
@@ -150,6 +184,8 @@ class Placement:
 
 def overlap(a: Placement, b: Placement, clearance: float = 0.0) -> bool:
     """Whether two footprints come closer than `clearance` (separating axes of the two rectangles)."""
+    if np.hypot(*(a.xy - b.xy)) > a.half_diagonal + b.half_diagonal + 2 * clearance:
+        return False
     corners_a, corners_b = a.corners(clearance / 2), b.corners(clearance / 2)
     for yaw in (a.yaw, b.yaw):
         axes = rotation_z(yaw)[:2, :2]
@@ -160,11 +196,11 @@ def overlap(a: Placement, b: Placement, clearance: float = 0.0) -> bool:
 
 
 def within_reach(xy: FloatArray) -> bool:
-    """Whether a top-down grasp at (x, y) is within the arm's comfortable reach."""
-    return REACH_RADIUS[0] <= float(np.hypot(*xy)) <= REACH_RADIUS[1]
+    """Whether a top-down grasp at (x, y) is within the arm's comfortable reach, in front of the robot."""
+    return float(xy[0]) >= 0.0 and REACH_RADIUS[0] <= float(np.hypot(*xy)) <= REACH_RADIUS[1]
 
 
-def place_objects(scene: Scene, rng: np.random.Generator, tries: int = 200) -> tuple[Placement, ...]:
+def place_objects(scene: Scene, rng: np.random.Generator, draws: int = DRAWS) -> tuple[Placement, ...]:
     """One layout of the scene.
 
     Whole layouts are drawn afresh until one fits, so that early objects don't crowd out later ones for good.
@@ -172,14 +208,14 @@ def place_objects(scene: Scene, rng: np.random.Generator, tries: int = 200) -> t
     Raises
     ------
     UsageError
-        Where no layout fits within `tries`: too many objects, or fixed places that overlap or lie out of reach.
+        Where `draws` poses give no layout: too many objects, or fixed places that overlap or lie out of reach.
 
     """
-    problem = ""
-    for _ in range(tries):
+    while True:
         placed: dict[str, Placement] = {}
         for thing in scene.objects:
             for candidate in _candidates(thing, placed, rng):
+                draws -= 1
                 problem = _conflict(candidate, placed)
                 if not problem:
                     placed[thing.name] = candidate
@@ -188,14 +224,15 @@ def place_objects(scene: Scene, rng: np.random.Generator, tries: int = 200) -> t
                 break
         else:
             return tuple(placed.values())
-    raise UsageError(f"The scene does not fit on the table: {problem}. Use fewer objects or larger regions.")
+        if draws <= 0:
+            raise UsageError(f"The scene does not fit on the table: {problem}. Use fewer objects or larger regions.")
 
 
 def _candidates(thing: SceneObject, placed: Mapping[str, Placement], rng: np.random.Generator) -> Iterator[Placement]:
-    """Up to 40 draws of one object's pose; a single one where nothing is drawn."""
+    """Up to `DRAWS_EACH` draws of one object's pose; a single one where nothing is drawn."""
     place, model = thing.place, thing.model()
     fixed_xy = place.at is not None or place.beside is not None or place.on is not None
-    for _ in range(1 if fixed_xy and not isinstance(place.yaw, tuple) else 40):
+    for _ in range(1 if fixed_xy and not isinstance(place.yaw, tuple) else DRAWS_EACH):
         z = model.rest_z
         if place.on is not None:
             below = placed[place.on]
@@ -214,8 +251,18 @@ def _conflict(candidate: Placement, placed: Mapping[str, Placement]) -> str:
     """Why a placement is not possible; empty where it is."""
     if not within_reach(candidate.xy):
         x, y = candidate.xy
-        return f"{candidate.name} at ({x:.2f}, {y:.2f}) is out of reach ({REACH_RADIUS[0]} to {REACH_RADIUS[1]} m)"
+        low, high = REACH_RADIUS
+        return f"{candidate.name} at ({x:.2f}, {y:.2f}) is out of reach ({low} to {high} m, in front of the robot)"
+    beneath = set(_supports(candidate, placed))
     for other in placed.values():
-        if other.name != candidate.on and overlap(candidate, other, CLEARANCE):
+        if other.name not in beneath and overlap(candidate, other, CLEARANCE):
             return f"{candidate.name} overlaps {other.name}"
     return ""
+
+
+def _supports(candidate: Placement, placed: Mapping[str, Placement]) -> Iterator[str]:
+    """The names of what a placement stands on, down to the table."""
+    below = candidate.on
+    while below is not None:
+        yield below
+        below = placed[below].on

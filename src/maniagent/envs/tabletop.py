@@ -16,6 +16,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..assets import WX250S_XML
+from ..errors import UsageError
 from ..geometry import FloatArray, make_transform
 from ..types import CameraFrame, Observation, RobotState
 from .cameras import MAIN_CAMERA, SIDE_CAMERA, CameraSpec, DepthNoise
@@ -43,7 +44,12 @@ class TrueObject:
     angular_speed: float
     """rad/s."""
     touched: bool
-    """Whether a finger is in contact with it."""
+    """Whether a finger, or any other part of the robot, is in contact with it."""
+
+
+def _body(name: str) -> str:
+    """MuJoCo's name for an object's body: no scene's names clash with the robot's."""
+    return f"object/{name}"
 
 
 class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
@@ -82,7 +88,7 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         self._finger_qpos = int(self.model.joint("left_finger").qposadr[0])
         self._actuators = np.array([self.model.actuator(name).id for name in JOINTS])
         self._gripper_actuator = int(self.model.actuator("gripper").id)
-        self._finger_bodies = {self.model.body(f"{side}_finger_link").id for side in ("left", "right")}
+        self._of_robot = self.model.body_rootid == self.model.body("base_link").id
         self._renderer: OffscreenRenderer | None = None
         self._viewer: Any = None
         self._declare_spaces()
@@ -96,7 +102,7 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         spec.option.impratio = 10.0
         add_studio(spec, self.cameras)
         for name, model in self._objects.items():
-            attach(spec, model, name)
+            attach(spec, model, _body(name))
         # The arm's keyframe knows nothing of the objects' joints; home is read before it is dropped.
         self.home = np.array(list(spec.key("home").qpos))[:6]
         for key in list(spec.keys):
@@ -115,7 +121,7 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         for camera in self.cameras:
             shape = (camera.height, camera.width)
             images[f"{camera.name}_rgb"] = gym.spaces.Box(0, 255, (*shape, 3), np.uint8)
-            images[f"{camera.name}_depth"] = gym.spaces.Box(-np.inf, np.inf, shape, np.float32)
+            images[f"{camera.name}_depth"] = gym.spaces.Box(0.0, np.inf, shape, np.float32)
         self.observation_space = gym.spaces.Dict(
             {
                 "joint_positions": gym.spaces.Box(-np.inf, np.inf, (6,), np.float64),
@@ -131,10 +137,12 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
     ) -> tuple[dict[str, Any], dict[str, Any]]:
         """Draw a layout, put the arm at home, let everything settle.
 
-        `options={"layout": placements}` sets that layout instead of drawing one.
+        `options={"layout": placements}` sets that layout, of all the scene's objects, instead of drawing one.
         """
         super().reset(seed=seed)
         self.layout = tuple((options or {}).get("layout") or place_objects(self.scene, self.np_random))
+        if {placement.name for placement in self.layout} != set(self._objects):
+            raise UsageError(f"The layout should place {', '.join(self._objects)}, each once.")
         mujoco.mj_resetData(self.model, self.data)
         self.data.qpos[self._joint_qpos] = self.home
         for side in ("left_finger", "right_finger"):
@@ -142,14 +150,16 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         for placement in self.layout:
             half = placement.yaw / 2
             pose = [*placement.xy, placement.z + 0.001, np.cos(half), 0.0, 0.0, np.sin(half)]
-            self.data.joint(placement.name).qpos[:] = pose
+            self.data.joint(_body(placement.name)).qpos[:] = pose
         mujoco.mj_forward(self.model, self.data)
         for _ in range(round(SETTLE_SECONDS / self.period)):
             self.advance(self.home, self.opening_range[1])
         return self._gym_observation(), {"layout": self.layout}
 
     def step(self, action: NDArray[np.float64]) -> tuple[dict[str, Any], float, bool, bool, dict[str, Any]]:
-        """One control period. Actions outside the action space are clipped."""
+        """One control period. Actions outside the action space are clipped; UsageError where one is not finite."""
+        if not np.isfinite(action).all():
+            raise UsageError(f"The action {action} is not finite; nothing moves.")
         bounds = self._action_bounds
         action = np.clip(action, bounds.low, bounds.high)
         self.advance(action[:6], float(action[6]))
@@ -160,7 +170,7 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         return self._render(self.cameras[0])[0]
 
     def close(self) -> None:
-        """Free the renderer and the viewer; the environment can't be used afterwards."""
+        """Free the renderer and the viewer; closing twice does no harm."""
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
@@ -173,7 +183,8 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         state = observation.robot
         images: dict[str, Any] = {}
         for name, frame in observation.frames.items():
-            images |= {f"{name}_rgb": frame.rgb, f"{name}_depth": frame.depth}
+            # Gymnasium's spaces can't hold NaN: as depth cameras do, 0 says that nothing is known.
+            images |= {f"{name}_rgb": frame.rgb, f"{name}_depth": np.nan_to_num(frame.depth, nan=0.0)}
         opening = np.array([state.gripper_opening])
         return {"joint_positions": state.joint_positions, "gripper_opening": opening, **images}
 
@@ -230,8 +241,8 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         touched = self._touched_bodies()
         state: dict[str, TrueObject] = {}
         for name, model in self._objects.items():
-            body = self.data.body(name)
-            velocity = self.data.joint(name).qvel
+            body = self.data.body(_body(name))
+            velocity = self.data.joint(_body(name)).qvel
             state[name] = TrueObject(
                 model=model,
                 T_base_object=make_transform(body.xmat.reshape(3, 3).copy(), body.xpos.copy()),
@@ -242,13 +253,10 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         return state
 
     def _touched_bodies(self) -> set[int]:
-        bodies = self.model.geom_bodyid[self.data.contact.geom]  # (ncon, 2)
-        pairs = [(int(a), int(b)) for a, b in bodies.reshape(-1, 2)]
-        return {
-            b if a in self._finger_bodies else a
-            for a, b in pairs
-            if (a in self._finger_bodies) != (b in self._finger_bodies)
-        }
+        """Ids of the bodies that the robot is in contact with."""
+        bodies = self.model.geom_bodyid[self.data.contact.geom].reshape(-1, 2)
+        of_robot = self._of_robot[bodies]
+        return set(bodies[of_robot[:, ::-1] & ~of_robot].tolist())
 
     # Pictures -----------------------------------------------------------------------------------------------------
 

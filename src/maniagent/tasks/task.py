@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -63,6 +64,8 @@ class Task(BaseModel):
         spoken_of |= {point.away_from for point in self.points.values()}
         if missing := spoken_of - names:
             raise ValueError(f"no object is named {', '.join(sorted(missing))}")
+        if missing := set(re.findall(r"\{(.*?)\}", self.instruction)) - set(self.points):
+            raise ValueError(f"the instruction names points that are not given: {', '.join(sorted(missing))}")
         wanted = {c.point for c in self.success if isinstance(c, At) and isinstance(c.point, str)}
         if missing := wanted - set(self.points):
             raise ValueError(f"no point is named {', '.join(sorted(missing))}")
@@ -86,8 +89,8 @@ class Task(BaseModel):
 def _draw(point: DrawnPoint, layout: Sequence[Placement], rng: np.random.Generator) -> FloatArray:
     start = next(placement.xy for placement in layout if placement.name == point.away_from)
     for _ in range(1000):
-        # Rounded to the centimetre that is said in the instruction.
-        goal = np.round([rng.uniform(*point.x), rng.uniform(*point.y)], 2)
+        # Rounded to the centimetre that is said in the instruction, where -0.00 would look odd.
+        goal = np.round([rng.uniform(*point.x), rng.uniform(*point.y)], 2) + 0.0
         if within_reach(goal) and np.linalg.norm(goal - start) >= point.distance:
             return goal
     raise UsageError(f"No point within {point.x} x {point.y} keeps {point.distance} m from {point.away_from}.")
