@@ -107,7 +107,7 @@ def _judge_relation(command: Command, record: SubtaskRecord, moved: ObjectInfo, 
         return _failed(record, f"The {moved.name} was not put {where}.")  # on which side of it, the look doesn't say
     if any(there):
         return Verdict.SUCCESS, f"A look at the table shows the {moved.name} {where}."
-    if holds is _rests_on and _is_hidden_below(moved, target, now):
+    if holds is _rests_on and _is_hidden_below(moved, record.objects[1], now):
         return Verdict.SUCCESS, f"A look at the table shows the {moved.name} {where}, hiding it."
     return _failed(record, f"No {moved.name} is seen {where}.")
 
