@@ -58,10 +58,11 @@ def bound(
 
 @st.composite
 def made_objects(draw: st.DrawFn) -> tuple[ObjectInfo, ...]:
-    return tuple(
+    pepper, plate = (
         made_object(i, name, draw(st.tuples(metres, metres)), size=draw(sizes), yaw=draw(angles))
         for i, name in enumerate(("pepper", "plate"))
     )
+    return pepper, replace(plate, free_spot=draw(st.none() | st.tuples(metres, metres)))
 
 
 @st.composite
@@ -82,7 +83,9 @@ def anchored_steps(draw: st.DrawFn) -> tuple[ActionStep, ...]:
 def moved(thing: ObjectInfo, turn: float, shift: tuple[float, float]) -> ObjectInfo:
     T = make_transform(rotation_z(turn), [*shift, 0.0])
     grasps = tuple(GraspPose(T @ g.T_base_grasp, g.opening, g.score) for g in thing.grasps)
-    return replace(thing, centre=transform_points(T, thing.centre), yaw=thing.yaw + turn, grasps=grasps)
+    spot = None if thing.free_spot is None else transform_points(T, np.array([*thing.free_spot, 0.0]))[:2]
+    centre = transform_points(T, thing.centre)
+    return replace(thing, centre=centre, yaw=thing.yaw + turn, free_spot=spot, grasps=grasps)
 
 
 @given(made_objects(), anchored_steps(), angles, st.tuples(metres, metres))
@@ -169,6 +172,12 @@ def test_parts_are_at_their_heights_over_the_middle(part: Part, height: float) -
     pepper = made_object(0, "pepper", (0.2, 0.1), size=(0.1, 0.03, 0.02), base_z=0.04)
     (point,) = bound(step(ObjectAnchor(index=0, part=part), orientation=DOWN), objects=(pepper,))
     np.testing.assert_allclose(point.T_base_tcp[:3, 3], [0.2, 0.1, height])
+
+
+def test_the_surface_is_where_it_is_free_when_something_lies_on_it() -> None:
+    plate = replace(made_object(0, "plate", (0.3, 0.0), size=(0.2, 0.2, 0.01)), free_spot=[0.33, -0.04])
+    (point,) = bound(step(ObjectAnchor(index=0, part=Part.SURFACE), orientation=DOWN), objects=(plate,))
+    np.testing.assert_allclose(point.T_base_tcp[:3, 3], [0.33, -0.04, 0.01])
 
 
 def test_offsets_count_along_base_axes_or_the_viewers() -> None:

@@ -158,15 +158,14 @@ def shift(distance: float) -> Command:
 
 @given(st.floats(0.0, 0.1))
 def test_a_point_is_reached_within_two_and_a_half_centimetres(off: float) -> None:
-    found, evidence = judge(to_point((0.25, 0.10)), tried(PLATE), [at(PLATE, 0.25 + off, 0.10)])
+    found = verdict(to_point((0.25, 0.10)), tried(PLATE), at(PLATE, 0.25 + off, 0.10))
     if abs(off - 0.025) > 1e-6:
         assert found is (Verdict.SUCCESS if off < 0.025 else Verdict.FAILURE)
-    assert f"{off * 100:.1f} cm" in evidence
 
 
 def test_a_refused_way_to_a_point_tells_why() -> None:
-    _, evidence = judge(to_point((2.0, 2.0)), tried(PLATE, outcome=REFUSED), [PLATE])
-    assert REFUSED.reason in evidence
+    _, evidence = judge(to_point((0.30, 0.20)), tried(PLATE, outcome=REFUSED), [PLATE])
+    assert evidence == f"The plate lies 30.0 cm from (0.30, 0.20). {REFUSED.reason}"
 
 
 def test_a_shift_counts_by_its_length() -> None:
