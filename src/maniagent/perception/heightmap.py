@@ -16,6 +16,8 @@ from numpy.typing import NDArray
 from ..types import BoolArray
 from .views import ViewPoints, Workspace
 
+MIN_ISLAND = 6
+"""Cells; smaller islands are noise."""
 LIGHTNESS_WEIGHT = 0.4
 """How much lightness counts beside the two colour axes: a round object is dark on one side and still one object."""
 
@@ -80,6 +82,7 @@ def build_height_map(views: Sequence[ViewPoints], workspace: Workspace, cell: fl
 
 
 def _close_gaps(grid: HeightMap) -> HeightMap:
+    grid = _without_specks(grid)
     window = (5, 5)
     closed = cv2.morphologyEx(grid.occupied.astype(np.uint8), cv2.MORPH_CLOSE, np.ones(window, np.uint8)) > 0
     gaps = closed & ~grid.occupied
@@ -91,3 +94,12 @@ def _close_gaps(grid: HeightMap) -> HeightMap:
     # One pixel's noise mustn't make a peak of the topmost surface.
     smooth = np.where(closed, cv2.medianBlur(height, 3), np.float32(0))
     return HeightMap(grid.origin, grid.cell, smooth, rgb, closed)
+
+
+def _without_specks(grid: HeightMap) -> HeightMap:
+    """The map without islands of a few cells: single wrong pixels at the edges of things."""
+    _, islands, stats, _ = cv2.connectedComponentsWithStats(grid.occupied.astype(np.uint8), connectivity=8)
+    large = stats[:, cv2.CC_STAT_AREA] >= MIN_ISLAND
+    large[0] = False
+    kept = large[islands]
+    return HeightMap(grid.origin, grid.cell, np.where(kept, grid.height, np.float32(0)), grid.rgb, kept)

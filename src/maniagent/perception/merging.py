@@ -30,6 +30,8 @@ FLAT = 0.010
 """m; lower things are cloth, paper, print."""
 TINY = 1.8e-4
 """m^2; a part, never an object."""
+SMALL = 5e-4
+"""m^2; next to something larger, a part: a stem, a handle's knob."""
 ELONGATED = 2.4
 """Length over width from which end-to-end parts may make one tool, fruit or pen."""
 REACH = 8
@@ -96,9 +98,8 @@ class _Border:
 
     @property
     def lies_on_cloth(self) -> bool:
-        """One of them is flat and the other is not: nothing grows out of a cloth."""
-        low, high = sorted((self.small.top, self.large.top))
-        return low < FLAT and high - low > LEVEL
+        """The large one is flat and the small one is not: nothing grows out of a cloth."""
+        return self.large.top < FLAT and self.small.top > self.large.top + LEVEL
 
     @property
     def is_level(self) -> bool:
@@ -122,14 +123,17 @@ def _limb(border: _Border) -> bool:
 
 
 def _vessel(border: _Border) -> bool:
-    """Bottom and walls of what would hold water."""
+    """Bottom and walls of what would hold water; what lies on the bottom stands out of it and touches no outside."""
+    inside = border.outer < 0.1 * border.perimeter and border.share > 0.85
+    if inside and border.step < -LEVEL:
+        return False
     return border.small.basin > 0 and border.small.basin == border.large.basin and border.same_hue
 
 
 def _print(border: _Border) -> bool:
     """A pattern within a surface: no step, and (almost) no border with the table."""
     no_higher = border.small.top < border.large.top + LEVEL
-    return border.is_level and no_higher and border.share > 0.35 and border.outer < 0.1 * border.perimeter
+    return border.is_level and no_higher and border.share > 0.35 and border.outer < 0.2 * border.perimeter
 
 
 def _cloth(border: _Border) -> bool:
@@ -137,18 +141,22 @@ def _cloth(border: _Border) -> bool:
 
 
 def _attachment(border: _Border) -> bool:
-    """A stem, a beak, a leaf: tiny, or small, level with what it grows from, and at its edge, not on it."""
-    if border.small.area < TINY:
+    """A stem, a beak, a leaf: tiny, or small and at the edge of what it grows from, not on it."""
+    small, large = border.small.area, border.large.area
+    if small < TINY:
         return border.share > 0.05
-    at_the_edge = border.outer > 0.15 * border.perimeter and not border.lies_on_cloth
-    small = border.small.area < 0.35 * border.large.area
-    return at_the_edge and small and abs(border.step) < 0.006 and border.share > 0.25
+    if border.lies_on_cloth:
+        return False
+    if small < min(SMALL, 0.25 * large) and border.outer > 0.4 * border.perimeter:
+        return True
+    level = abs(border.step) < 0.006
+    return level and small < 0.35 * large and border.share > 0.25 and border.outer > 0.15 * border.perimeter
 
 
 def _end_to_end(border: _Border) -> bool:
     """Cap and pen, leaf and carrot, husk and cob: together one long, full shape, joined across its width."""
     length, width, fill = _rectangle(np.concatenate([border.small.cells, border.large.cells]), border.cell)
-    if length < ELONGATED * width or fill < 0.6 or abs(border.step) > 0.012:
+    if length < ELONGATED * width or fill < 0.4 or abs(border.step) > 0.012:
         return False
     if border.length * border.cell > 3.0 * width:
         return False
