@@ -22,6 +22,10 @@ from .tasks import Task, get, load_task
 from .types import RunResult
 
 
+REST_SECONDS = 1.0
+"""Robot time between the arm's coming home and the verdict on true state: whatever rolls has come to rest."""
+
+
 @dataclass(frozen=True)
 class RunOutcome:
     """What a run came to: what the agents believe, and what is true."""
@@ -75,7 +79,12 @@ def run(
         recorders = [] if folder is None else [stack.enter_context(Recorder(folder))]
         log = EventLog([*recorders, *observers])
         robot = SimulatedRobot(env, on_frame=_film(log) if folder is not None else None)
-        result, achieved = _carry_out(robot, said, name, seed, log, lambda: episode.achieved(env.truth()))
+
+        def achieved_now() -> bool | None:
+            env.settle(REST_SECONDS)
+            return episode.achieved(env.truth())
+
+        result, achieved = _carry_out(robot, said, name, seed, log, achieved_now)
     return RunOutcome(name, seed, said, result, achieved, folder)
 
 

@@ -198,6 +198,10 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         if self.render_mode == "human":
             self._show()
 
+    def settle(self, seconds: float) -> None:
+        """Simulate with the targets as they are: time for things to come to rest."""
+        mujoco.mj_step(self.model, self.data, round(seconds / self.model.opt.timestep))
+
     def robot_state(self) -> RobotState:
         """What the encoders say."""
         tcp = self.data.site("tcp")
