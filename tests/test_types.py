@@ -23,6 +23,7 @@ from maniagent.types import (
     KeyPoint,
     ObjectAnchor,
     ObjectInfo,
+    OrientedBox,
     Observation,
     Orientation,
     Part,
@@ -84,6 +85,23 @@ def test_nobody_writes_into_a_frame(name: str) -> None:
         getattr(frame(), name)[0] = 0
 
 
+def test_a_box_keeps_its_place_when_the_caller_moves_on() -> None:
+    centre = np.zeros(3)
+    box = OrientedBox(centre, np.ones(3), 0.0)
+    centre[:] = 1.0
+    assert not box.centre.any()
+    with pytest.raises(ValueError, match=r"extent has shape \(2,\), wanted \(3,\)"):
+        OrientedBox(centre, np.ones(2), 0.0)
+
+
+def test_what_is_free_of_an_object_is_a_point_of_its_upper_side() -> None:
+    spot = block(free_spot=[0.3, 0.1]).free_spot
+    assert spot is not None
+    np.testing.assert_array_equal(spot, [0.3, 0.1])
+    with pytest.raises(ValueError, match="free_spot has shape"):
+        block(free_spot=[0.3, 0.1, 0.0])
+
+
 def test_nobody_writes_into_state_poses_and_objects() -> None:
     for array in (
         robot_state().joint_positions,
@@ -138,7 +156,7 @@ def test_the_main_view_is_one_of_the_frames() -> None:
 
 def test_an_object_is_told_in_one_line() -> None:
     assert str(block()) == (
-        "[2] red block: centre (0.300, -0.100, 0.015) m, extent 0.050 x 0.030 x 0.030 m, yaw 30 deg, no grasp"
+        "[2] red block: centre (0.300, -0.100, 0.015) m, extent 0.050 x 0.030 x 0.030 m, yaw 30 deg"
     )
 
 
@@ -209,11 +227,12 @@ def test_wrong_anchors_are_refused(anchor: object) -> None:
 @pytest.mark.parametrize("number", [float("nan"), float("inf"), -float("inf"), 1e300, 2.0001])
 @pytest.mark.parametrize("where", ["anchor", "offset", "yaw"])
 def test_numbers_that_are_not_finite_or_huge_are_refused(where: str, number: float) -> None:
-    changes: dict[str, Any] = {
+    written: dict[str, dict[str, Any]] = {
         "anchor": {"anchor": {"x": number, "y": 0.0}},
         "offset": {"offset": (0.0, 0.0, number)},
         "yaw": {"orientation": {"kind": "top-down", "yaw": 10 * number}},
-    }[where]
+    }
+    changes = written[where]
     with pytest.raises(ValidationError):
         ActionStep.model_validate(STEP | changes)
     with pytest.raises(ValidationError):
@@ -321,6 +340,7 @@ def test_a_subtask_is_something_to_do_or_an_end(written: dict[str, Any]) -> None
         {"text": "put it there"},
         {"objects": ["every cup"]},
         {"text": "put it there", "objects": [""]},
+        {"text": "put it there", "objects": ["every cup"] * 65},
         {"done": True, "cannot": True},
         {"done": True, "confidence": 1.0},
         {"text": "x" * 501, "objects": ["every cup"]},

@@ -142,6 +142,10 @@ class OrientedBox:
     yaw: float
     """rad, direction of the box's own x axis in the base xy plane."""
 
+    def __post_init__(self) -> None:
+        object.__setattr__(self, "centre", _frozen(self.centre, (3,), np.float64, "centre"))
+        object.__setattr__(self, "extent", _frozen(self.extent, (3,), np.float64, "extent"))
+
 
 @dataclass(frozen=True)
 class ObjectInfo:
@@ -194,16 +198,14 @@ class ObjectInfo:
         """One line for a language model: metres to the millimetre, degrees."""
         x, y, z = self.centre
         length, width, height = self.extent
-        grasp = "no grasp"
+        grasp = ""
         if self.grasp is not None:
             gx, gy, gz = self.grasp.T_base_grasp[:3, 3]
             closing = self.grasp.T_base_grasp[:3, 1]
-            grasp = (
-                f"grasp at ({gx:.3f}, {gy:.3f}, {gz:.3f}) yaw {np.degrees(np.arctan2(-closing[0], closing[1])):.0f} deg"
-            )
+            grasp = f", grasp at ({gx:.3f}, {gy:.3f}, {gz:.3f}) yaw {np.degrees(np.arctan2(-closing[0], closing[1])):.0f} deg"
         return (
             f"[{self.index}] {self.name}: centre ({x:.3f}, {y:.3f}, {z:.3f}) m, "
-            f"extent {length:.3f} x {width:.3f} x {height:.3f} m, yaw {np.degrees(self.yaw):.0f} deg, {grasp}"
+            f"extent {length:.3f} x {width:.3f} x {height:.3f} m, yaw {np.degrees(self.yaw):.0f} deg{grasp}"
         )
 
 
@@ -249,7 +251,7 @@ class Subtask(_Written):
     """The instruction can't be carried out; `reason` says why."""
     text: Annotated[str, Field(max_length=500)] = ""
     """The sub-task in one imperative sentence."""
-    objects: tuple[Text, ...] = ()
+    objects: Annotated[tuple[Text, ...], Field(max_length=64)] = ()
     """Queries for the objects the sub-task needs, in the order of their indices."""
 
     @model_validator(mode="after")

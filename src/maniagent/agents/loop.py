@@ -6,6 +6,7 @@ memory and is retried within the budget; whatever happens, the arm ends at rest 
 
 from __future__ import annotations
 
+import re
 import time
 from collections import defaultdict
 from collections.abc import Iterator, Sequence
@@ -98,7 +99,7 @@ class _Run:
                 end = self._take_turn()
                 self._failed_looks = 0
             except StageFailure as failure:
-                self.log.emit("failed", turn=self.turn, stage=str(failure.stage), reason=str(failure))
+                self._tell(failure)
                 self._failed_looks += 1
                 if self._failed_looks >= self.budget.failed_looks:
                     return RunVerdict.CANNOT, str(failure)
@@ -139,7 +140,7 @@ class _Run:
         except CameraFailure:
             raise
         except StageFailure as failure:
-            self.log.emit("failed", turn=self.turn, stage=str(failure.stage), reason=str(failure))
+            self._tell(failure)
             report = ExecutionReport(completed=False, reached=0, reason=str(failure), stage=str(failure.stage))
             self.memory.add(SubtaskRecord(subtask.text, located.objects, report, queries=subtask.objects))
             return
@@ -158,24 +159,32 @@ class _Run:
     ) -> tuple[tuple[ObjectInfo, ...], tuple[KeyPoint, ...]]:
         """Key points that the robot accepts, and the objects with the grasps these use.
 
-        A sequence that doesn't bind or can't be moved goes back to the controller with the reason.
+        A sequence that doesn't bind or can't be moved goes back to the controller with the reason, until its answers
+        are used up or it repeats itself.
         """
-        feedback = ""
-        for answers_left in reversed(range(self.budget.answers)):
+        refused: ActionSequence | None = None
+        refusal: StageFailure = FormatFailure("The controller was not asked.")
+        for _ in range(self.budget.answers):
             with self.timed("control"):
-                sequence = self.agents.controller.write(subtask, located.objects, feedback)
+                sequence = self.agents.controller.write(subtask, located.objects, str(refusal) if refused else "")
+            if sequence == refused:
+                break
+            if refused is not None:
+                self._tell(refusal)
             try:
                 with self.timed("planning"):
                     objects, keypoints = self._bind_and_check(sequence, located.objects, boxes, viewpoint)
-            except (FormatFailure, GraspFailure, MotionRejected) as failure:
-                feedback = str(failure)
-                if not answers_left:
-                    raise
-                self.log.emit("failed", turn=self.turn, stage=str(failure.stage), reason=feedback)
+            except MotionRejected as failure:
+                refused, refusal = sequence, MotionRejected(_by_name(str(failure), located))
+            except (FormatFailure, GraspFailure) as failure:
+                refused, refusal = sequence, failure
             else:
                 self.log.emit("planned", turn=self.turn, sequence=sequence, keypoints=keypoints)
                 return objects, keypoints
-        raise FormatFailure(feedback)
+        raise refusal
+
+    def _tell(self, failure: StageFailure) -> None:
+        self.log.emit("failed", turn=self.turn, stage=str(failure.stage), reason=str(failure))
 
     def _bind_and_check(
         self, sequence: ActionSequence, objects: Sequence[ObjectInfo], boxes: Boxes, viewpoint: Viewpoint
@@ -200,6 +209,12 @@ class _Run:
             yield
         finally:
             self.seconds[stage] += time.monotonic() - start
+
+
+def _by_name(reason: str, located: Located) -> str:
+    """A planner's reason with the objects' names beside their numbers, which are all that motion knows."""
+    names = {info.index: info.name for info in (*located.objects, *located.surroundings)}
+    return re.sub(r"\bobject (\d+)\b", lambda m: f"object {m[1]} ({names.get(int(m[1]), 'unknown')})", reason)
 
 
 def _grasp_choices(objects: Sequence[ObjectInfo], limit: int) -> Iterator[tuple[ObjectInfo, ...]]:

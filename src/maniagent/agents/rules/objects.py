@@ -60,7 +60,8 @@ class RulesObjectAgent:
             for i, k in enumerate(others, len(chosen))
         )
         detections = tuple(
-            _detection(view.segments[k], query, observation) for k, query in zip(chosen, names, strict=True)
+            _detection(view.segments[k], query, self._lexicon.score(query, view.segments[k]), observation)
+            for k, query in zip(chosen, names, strict=True)
         )
         return Located(objects, detections, surroundings)
 
@@ -106,11 +107,11 @@ def _leading_first(grasps: tuple[GraspPose, ...], segment: Segment, direction: F
     return tuple(sorted(grasps, key=lambda grasp: -(grasp.score + 0.5 * lead(grasp))))
 
 
-def _detection(segment: Segment, query: str, observation: Observation) -> Detection:
+def _detection(segment: Segment, query: str, score: float, observation: Observation) -> Detection:
     """Where a segment is in the main view."""
     mask = segment.masks.get(observation.main)
     if mask is None or not mask.any():
-        return Detection(query, (0.0, 0.0, 0.0, 0.0), 1.0, observation.main)
+        return Detection(query, (0.0, 0.0, 0.0, 0.0), score, observation.main)
     rows, columns = np.flatnonzero(mask.any(axis=1)), np.flatnonzero(mask.any(axis=0))
     box = (float(columns[0]), float(rows[0]), float(columns[-1]), float(rows[-1]))
-    return Detection(query, box, 1.0, observation.main, mask)
+    return Detection(query, box, score, observation.main, mask)
