@@ -116,7 +116,7 @@ def test_a_camera_looks_at_its_target_upright(eye: FloatArray, target: FloatArra
     assert right[2] == pytest.approx(0.0, abs=1e-12)
     assert down[2] < 0.0
     target_camera = transform_points(invert_transform(T_base_camera), target)
-    np.testing.assert_allclose(target_camera, [0, 0, np.linalg.norm(target - eye)], atol=1e-9)
+    np.testing.assert_allclose(target_camera, [0.0, 0.0, float(np.linalg.norm(target - eye))], atol=1e-9)
     np.testing.assert_allclose(project(K, target_camera), K[:2, 2], atol=1e-3)
 
 

@@ -144,7 +144,7 @@ def gap(a: Placement, b: Placement) -> float:
 
 
 @pytest.mark.parametrize("name", tasks.names())
-@settings(max_examples=15, deadline=None)
+@settings(max_examples=15)
 @given(seed=seeds)
 def test_in_every_layout_of_every_task_fingers_fit_between_things_within_reach(name: str, seed: int) -> None:
     placed = place_objects(tasks.get(name).scene, np.random.default_rng(seed))

@@ -93,8 +93,8 @@ def test_another_seed_gives_another_layout_and_other_noise(small: TabletopEnv) -
 
 def test_noise_goes_on_while_nothing_moves(small: TabletopEnv) -> None:
     small.reset(seed=0)
-    frames = [small.observe().main_frame.depth for _ in range(2)]
-    assert not np.array_equal(*frames, equal_nan=True)
+    first, second = (small.observe().main_frame.depth for _ in range(2))
+    assert not np.array_equal(first, second, equal_nan=True)
 
 
 def test_a_given_layout_is_set(small: TabletopEnv) -> None:

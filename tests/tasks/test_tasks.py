@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+from dataclasses import replace
 from pathlib import Path
 
 import numpy as np
@@ -11,9 +12,12 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from maniagent import tasks
-from maniagent.envs.scene import place_objects, within_reach
+from maniagent.envs.cameras import CameraSpec
+from maniagent.envs.scene import Placement, place_objects, within_reach
+from maniagent.envs.tabletop import TabletopEnv
 from maniagent.errors import UnknownNameError, UsageError
 from maniagent.tasks import Episode, Task, load_task
+from maniagent.tasks.conditions import On
 
 DRAG = """
 instruction: "drag the plate to {goal}"
@@ -97,6 +101,40 @@ def test_a_point_that_can_not_keep_its_distance_is_refused(tmp_path: Path) -> No
     task = load_task(write(tmp_path, DRAG.replace("distance: 0.08", "distance: 0.4")))
     with pytest.raises(UsageError, match=r"No point within .* keeps 0\.4 m from plate"):
         episode(task, seed=0)
+
+
+# On real physics ----------------------------------------------------------------------------------------------------
+
+ONTO = [name for name in tasks.names() if any(isinstance(condition, On) for condition in tasks.get(name).success)]
+SMALL = (CameraSpec("main", (0.74, 0.0, 0.54), (0.26, 0.0, 0.0), focal_length=60.0, width=64, height=48),)
+
+
+def handed_over(episode: Episode, layout: tuple[Placement, ...]) -> tuple[Placement, ...]:
+    """The layout with everything a centimetre above where it should be; two things on one target side by side."""
+    by_name = {placement.name: placement for placement in layout}
+    aside = 0.045 if len(episode.success) > 1 else 0.0
+    for condition in episode.success:
+        assert isinstance(condition, On)
+        thing, target = by_name[condition.object], by_name[condition.target]
+        z = thing.model.rest_z + target.model.surface_z + 0.01
+        by_name[thing.name] = replace(thing, xy=target.xy + np.array([0.0, aside]), z=z, on=target.name)
+        aside = -aside
+    return tuple(by_name.values())
+
+
+@pytest.mark.parametrize("name", ONTO)
+def test_what_physics_lets_come_to_rest_on_its_target_counts(name: str) -> None:
+    task = tasks.get(name)
+    env = TabletopEnv(task.scene, cameras=SMALL)
+    rng = np.random.default_rng(0)
+    for _ in range(2):
+        layout = place_objects(task.scene, rng)
+        episode = task.episode(layout, rng)
+        env.reset(seed=0, options={"layout": handed_over(episode, layout)})
+        for _ in range(75):
+            env.advance(env.home, env.opening_range[1])
+        assert episode.achieved(env.truth())
+    env.close()
 
 
 # Files --------------------------------------------------------------------------------------------------------------
