@@ -54,6 +54,7 @@ TAKE = ActionSequence(
         ),
     ),
 )
+OTHER = TAKE.model_copy(update={"skill": "take otherwise"})
 NONSENSE = ActionSequence(
     skill="nonsense",
     steps=(ActionStep(description="Go", anchor=ObjectAnchor(index=9), orientation=Orientation(kind="top-down")),),
@@ -180,7 +181,7 @@ def test_no_more_grasps_are_tried_than_the_budget_says() -> None:
 @pytest.mark.parametrize(
     ("robot", "bad", "reason"),
     [
-        (FakeRobot(refuse=refuse_first(3)), TAKE, "It is out of reach."),
+        (FakeRobot(refuse=refuse_first(3)), OTHER, "It is out of reach."),
         (FakeRobot(), NONSENSE, "Step 1 (Go): there is no object 9; the objects are [0, 1]."),
     ],
 )
@@ -197,13 +198,21 @@ def test_a_refused_sequence_goes_back_to_the_controller_with_the_reason(
 
 
 def test_nothing_moves_when_no_answer_of_the_controller_is_accepted() -> None:
-    robot = FakeRobot(refuse=refuse_first(99))
-    agents = ScriptedAgents([TRY, CANNOT], [FOUND], [TAKE])
-    (record,) = carry_out(agents, robot, answers=2).subtasks
-    assert len(agents.feedback) == 2
+    robot, listener = FakeRobot(refuse=refuse_first(99)), Listener()
+    agents = ScriptedAgents([TRY, CANNOT], [FOUND], [TAKE, OTHER, TAKE])
+    (record,) = carry_out(agents, robot, listener, answers=3).subtasks
+    assert len(agents.feedback) == 3
+    assert len(listener.data("failed")) == 3
     assert robot.executed == []
     assert (record.outcome.completed, record.outcome.stage) == (False, "planning")
     assert record.outcome.reason == "It is out of reach."
+
+
+def test_a_controller_that_repeats_itself_is_not_tried_again() -> None:
+    robot, listener = FakeRobot(refuse=refuse_first(99)), Listener()
+    carry_out(ScriptedAgents([TRY, CANNOT], [FOUND], [TAKE]), robot, listener, answers=5)
+    assert len(robot.checked) == len(PEPPER.grasps)
+    assert len(listener.data("failed")) == 1
 
 
 def test_an_arm_that_does_not_get_home_failed_the_attempt_and_the_run_says_so() -> None:

@@ -116,7 +116,7 @@ def _off_colour(rgb: NDArray[np.uint8], on_plane: BoolArray, tuning: Tuning) -> 
     table = np.median(lab[on_plane[: height // 2 * 2 : 2, : width // 2 * 2 : 2]], axis=0)
     lightness = lab[..., 0]
     # In shadow a surface loses chroma along with lightness (128 is grey in 8-bit Lab).
-    shade = np.minimum(lightness / table[0], np.float32(1.2))[..., None]
+    shade = np.minimum(lightness / max(table[0], 1.0), np.float32(1.2))[..., None]
     off_hue = lab[..., 1:] - np.float32(128) - (table[1:] - np.float32(128)) * shade
     other_hue = np.einsum("hwc,hwc->hw", off_hue, off_hue) > tuning.chroma**2
     differs = other_hue | (lightness > table[0] + tuning.brighter) | (lightness < table[0] * tuning.darker)
