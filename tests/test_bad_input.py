@@ -1,0 +1,342 @@
+"""Whatever goes in, a run ends in a clear verdict or one clear error, with the arm at rest in its safe pose.
+
+Everything here goes through `maniagent.app.run` or the command line, in the real twin, with a fault let in where a
+fault would come from: the words, the scene file, the cameras, the things on the table, somebody's hand.
+"""
+
+import json
+import re
+from collections.abc import Callable
+from dataclasses import replace
+from pathlib import Path
+from typing import Any
+
+import mujoco
+import numpy as np
+import pytest
+from typer.testing import CliRunner
+
+from maniagent.app import RunOutcome, run
+from maniagent.cli import app
+from maniagent.envs.tabletop import TabletopEnv
+from maniagent.errors import UsageError
+from maniagent.geometry import FloatArray
+from maniagent.types import CameraFrame, Observation, RunVerdict
+
+Fault = Callable[[TabletopEnv, Observation, int], Observation]
+"""Twin, what its cameras show, the how-manieth look this is (from 1): what the robot gets to see."""
+
+
+def no_fault(env: TabletopEnv, seen: Observation, look: int) -> Observation:
+    return seen
+
+
+class Twin(TabletopEnv):
+    """The twin with a fault between cameras and robot, that remembers how the arm was left."""
+
+    fault: Fault = staticmethod(no_fault)
+    grip = 1.0
+    """Friction of everything but the table, as a share of what it should be."""
+    looks = 0
+    arm: tuple[FloatArray, FloatArray, FloatArray]
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        self.model.geom_friction[:, 0] *= self.grip
+        Twin.latest = self
+
+    latest: "Twin"
+
+    def reset(self, **options: Any) -> Any:
+        answer = super().reset(**options)
+        self.looks = 0
+        return answer
+
+    def observe(self) -> Observation:
+        self.looks += 1
+        return type(self).fault(self, super().observe(), self.looks)
+
+    def close(self) -> None:
+        self.arm = (self.robot_state().joint_positions, self.joint_velocities, self.home)
+        super().close()
+
+
+@pytest.fixture
+def twin(monkeypatch: pytest.MonkeyPatch) -> Callable[..., RunOutcome]:
+    """Run with a fault, and see to it that the arm is at home and at rest afterwards."""
+
+    def carry_out(
+        instruction: str | None = None, *, task: str = "pepper-on-plate", fault: Fault = no_fault, grip: float = 1.0,
+        **options: Any,
+    ) -> RunOutcome:  # fmt: skip
+        kind = type("FaultyTwin", (Twin,), {"fault": staticmethod(fault), "grip": grip})
+        monkeypatch.setattr("maniagent.app.TabletopEnv", kind)
+        which = {} if "scene" in options else {"task": task}
+        outcome = run(instruction, **which, **options)
+        positions, velocities, home = Twin.latest.arm
+        assert np.abs(positions - home).max() < 0.05, "the arm is at home"
+        assert np.abs(velocities).max() < 0.1, "the arm is at rest"
+        assert outcome.result.reason
+        return outcome
+
+    return carry_out
+
+
+# Words ------------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("instruction", "task", "said"),
+    [
+        ("put the banana on the plate", "pepper-on-plate", "No banana is in view. Seen: "),
+        ("put the pepper into the basket", "pepper-on-plate", "No basket is in view"),
+        ("put the red pepper on the plate", "middle-pepper", "2 objects fit 'red pepper' equally well. Say which"),
+        ("put the pepper on the red pepper", "pepper-on-plate", "mean the same thing"),
+        ("put the pepper at (0.45, 0.35)", "pepper-on-plate", "outside the workspace|out of reach|reach"),
+        ("put the pepper at (1.5, 0)", "pepper-on-plate", "x = 1.* m is outside the workspace"),
+        ("drag the plate to (-0.3, 0)", "drag-plate", "outside the workspace|No grasp"),
+        ("I am hungry", "hungry", "needs a language model"),
+    ],
+)
+def test_what_cannot_be_done_is_said_plainly(
+    twin: Callable[..., RunOutcome], instruction: str, task: str, said: str
+) -> None:
+    outcome = twin(instruction, task=task)
+    assert outcome.result.verdict is RunVerdict.CANNOT
+    assert outcome.achieved is False
+    assert re.search(said, outcome.result.reason), outcome.result.reason
+
+
+STRANGE = {
+    "very long": "put the pepper " * 700,
+    "one long word": "x" * 10_000,
+    "control characters": "put\x00 the \x1b[2Jpepper\x07 \r\n\x08",
+    "HTML": "<script>alert('pepper')</script> & <img src=x onerror=alert(1)>",
+    "braces": "put the {pepper} on %s ${HOME} {0}",
+    "lone surrogate": "put the \ud83e pepper",
+    "other alphabets": "ضع الفلفل على الطبق 把辣椒放在盘子上 🌶️",
+    "numbers": "put the pepper at (nan, 1e999)",
+}
+
+
+@pytest.mark.parametrize("text", STRANGE.values(), ids=STRANGE)
+def test_strange_text_is_refused_with_a_reason_of_readable_length(twin: Callable[..., RunOutcome], text: str) -> None:
+    outcome = twin(text)
+    assert outcome.result.verdict is RunVerdict.CANNOT
+    assert len(outcome.result.reason) < 500
+    assert outcome.result.subtasks == ()
+
+
+@pytest.mark.parametrize("text", ["", "  \n\t "])
+def test_an_empty_instruction_is_wrong_use(text: str) -> None:
+    with pytest.raises(UsageError, match="no instruction"):
+        run(text, task="pepper-on-plate")
+
+
+def test_strange_text_leaves_a_whole_folder_without_markup_of_its_own(
+    twin: Callable[..., RunOutcome], tmp_path: Path
+) -> None:
+    text = STRANGE["HTML"] + STRANGE["control characters"] + STRANGE["lone surrogate"]
+    twin(text, out=tmp_path / "run")
+    page = (tmp_path / "run" / "report.html").read_text(encoding="utf-8")
+    assert "<script>alert" not in page
+    assert "<img src=x" not in page
+    assert json.loads((tmp_path / "run" / "summary.json").read_text())["verdict"] == "cannot"
+
+
+# Wrong use --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("options", "said"),
+    [
+        ({"task": "peper-on-plate"}, "Unknown task 'peper-on-plate'. Did you mean 'pepper-on-plate'?"),
+        ({}, "either a task"),
+        ({"task": "pepper-on-plate", "scene": "kitchen.yaml"}, "not both"),
+        ({"task": "pepper-on-plate", "seed": -1}, "seed is -1"),
+        ({"scene": "no/such/file.yaml"}, "no/such/file.yaml"),
+        ({"scene": "."}, "Can't read"),
+    ],
+)
+def test_wrong_use_is_one_clear_error(options: dict[str, Any], said: str) -> None:
+    with pytest.raises(UsageError, match=said.replace("?", r"\?")):
+        run("put the pepper on the plate", **options)
+
+
+THING = "objects: [{name: thing, kind: carrot%s}]"
+MISTAKES = {
+    "not YAML": ("objects: [}", "not valid YAML"),
+    "no mapping": ("- carrot", "should hold a mapping"),
+    "nothing": ("", "should hold a mapping"),
+    "code": ("objects: !!python/object/apply:os.getcwd []", "not valid YAML"),
+    "no objects": ("objects: []", "objects"),
+    "misspelt key": ("objekts: []", "objekts"),
+    "unknown kind": ("objects: [{name: thing, kind: carot}]", "carot"),
+    "bad name": ("objects: [{name: The Thing, kind: carrot}]", "objects.0.name"),
+    "twice the same": ("objects: [{name: a, kind: carrot}, {name: a, kind: egg}]", "two objects are named 'a'"),
+    "not a number": (THING % ", place: {at: [.nan, 0]}", "place.at"),
+    "out of reach": (THING % ", place: {at: [0.9, 0.0]}", "out of reach"),
+    "on the unknown": (THING % ", place: {on: table}", "must be listed before"),
+    "empty region": (THING % ", place: {region: {x: [0.3, 0.2], y: [0, 0.1]}}", r"\[low, high\]"),
+    "overlap": (
+        "objects: [{name: a, kind: egg, place: {at: [0.3, 0]}}, {name: b, kind: egg, place: {at: [0.3, 0.01]}}]",
+        "overlaps",
+    ),
+    "no such parameter": (THING % ", params: {weight: 3}", "weight"),
+    "a parameter of the wrong kind": ("objects: [{name: b, kind: block, params: {size: big}}]", "size"),
+    "a nested parameter": ("objects: [{name: b, kind: block, params: {size: {x: 1}}}]", "size"),
+    "a parameter that is not finite": ("objects: [{name: b, kind: block, params: {size: .nan}}]", "not nan"),
+    "a colour that is none": ("objects: [{name: b, kind: block, params: {colour: mauvish}}]", "mauvish"),
+    "success of the unknown": (
+        (THING % "") + "\nsuccess: [{kind: 'on', object: thing, target: plate}]",
+        "no object is named plate",
+    ),
+}
+
+
+@pytest.mark.parametrize(("text", "said"), MISTAKES.values(), ids=MISTAKES)
+def test_a_scene_file_with_a_mistake_is_refused_with_what_and_where(text: str, said: str, tmp_path: Path) -> None:
+    path = tmp_path / "scene.yaml"
+    path.write_text(text)
+    with pytest.raises(UsageError, match=said):
+        run("put the carrot on the plate", scene=path)
+
+
+def test_a_scene_file_that_is_no_text_is_refused(tmp_path: Path) -> None:
+    path = tmp_path / "scene.yaml"
+    path.write_bytes(bytes(range(256)))
+    with pytest.raises(UsageError, match="not valid YAML"):
+        run("put the carrot on the plate", scene=path)
+
+
+# Exit status ------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.parametrize(
+    ("arguments", "status"),
+    [
+        (["put the banana on the plate", "--task", "pepper-on-plate"], 1),
+        (["put the pepper on the plate", "--task", "peper-on-plate"], 2),
+        (["", "--task", "pepper-on-plate"], 2),
+    ],
+)
+def test_the_command_ends_with_its_documented_status_and_no_traceback(
+    arguments: list[str], status: int, tmp_path: Path
+) -> None:
+    done = CliRunner().invoke(app, ["run", *arguments, "--json", "--out", str(tmp_path / "run")])
+    assert done.exit_code == status
+    assert "Traceback" not in done.output
+    told = json.loads(done.stdout)
+    assert told["verdict"] == "cannot" if status == 1 else set(told) == {"error"}
+
+
+# Cameras ----------------------------------------------------------------------------------------------------------
+
+
+def changed(*names: str, depth: float | None = None, rgb: int | None = None) -> Fault:
+    """These cameras give that depth and that grey everywhere."""
+
+    def frame(old: CameraFrame) -> CameraFrame:
+        depths = old.depth if depth is None else np.full_like(old.depth, depth)
+        colours = old.rgb if rgb is None else np.full_like(old.rgb, rgb)
+        return replace(old, depth=depths, rgb=colours)
+
+    def fault(env: TabletopEnv, seen: Observation, look: int) -> Observation:
+        return replace(seen, frames={n: frame(f) if n in names else f for n, f in seen.frames.items()})
+
+    return fault
+
+
+@pytest.mark.parametrize(
+    "fault",
+    [
+        changed("main", "side", depth=np.nan),
+        changed("main", depth=np.nan),
+        changed("main", depth=np.nan, rgb=0),
+        changed("main", depth=0.0, rgb=0),
+        changed("main", depth=np.inf),
+        changed("main", "side", depth=-1.0),
+        changed("main", depth=0.02, rgb=30),
+    ],
+    ids=["all NaN", "main NaN", "main black", "main zero", "main infinite", "negative", "a hand before the lens"],
+)
+def test_a_main_camera_that_sees_nothing_ends_the_run_and_is_named(
+    twin: Callable[..., RunOutcome], fault: Fault
+) -> None:
+    outcome = twin(fault=fault)
+    assert outcome.result.verdict is RunVerdict.CANNOT
+    assert "main camera" in outcome.result.reason
+
+
+def test_a_camera_that_comes_back_lets_the_run_go_on(twin: Callable[..., RunOutcome]) -> None:
+    def fault(env: TabletopEnv, seen: Observation, look: int) -> Observation:
+        return changed("main", depth=np.nan)(env, seen, look) if look < 3 else seen
+
+    assert "No banana" in twin("put the banana on the plate", fault=fault).result.reason
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize("fault", [changed("side", depth=np.nan), changed("side", depth=np.nan, rgb=0)])
+def test_the_side_camera_can_be_done_without(twin: Callable[..., RunOutcome], fault: Fault) -> None:
+    outcome = twin(fault=fault)
+    assert (outcome.result.verdict, outcome.achieved) == (RunVerdict.ACHIEVED, True)
+
+
+def test_a_main_camera_without_colour_finds_no_pepper_and_says_so(twin: Callable[..., RunOutcome]) -> None:
+    outcome = twin(fault=changed("main", "side", rgb=0))
+    assert outcome.result.verdict is RunVerdict.CANNOT
+    assert outcome.result.reason
+
+
+# The world --------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_a_thing_that_slips_through_the_fingers_ends_in_a_clear_no(twin: Callable[..., RunOutcome]) -> None:
+    outcome = twin("put the carrot on the plate", task="carrot-on-plate", grip=0.005)
+    assert outcome.result.verdict is RunVerdict.CANNOT
+    assert outcome.achieved is False
+    assert 1 < len(outcome.result.subtasks) <= 4
+    assert any(record.outcome.stage == "grasp" for record in outcome.result.subtasks)
+
+
+def hand(name: str, to: tuple[float, float], look: int) -> Fault:
+    """Somebody puts an object elsewhere just before that look."""
+
+    def fault(env: TabletopEnv, seen: Observation, now: int) -> Observation:
+        if now != look:
+            return seen
+        body = env.model.body(f"object/{name}")
+        address = env.model.jnt_qposadr[body.jntadr[0]]
+        env.data.qpos[address : address + 3] = [*to, 0.02]
+        env.data.qpos[address + 3 : address + 7] = [1.0, 0.0, 0.0, 0.0]
+        mujoco.mj_forward(env.model, env.data)
+        for _ in range(25):
+            env.advance(env.home, env.opening_range[1])
+        return TabletopEnv.observe(env)
+
+    return fault
+
+
+@pytest.mark.slow
+def test_a_thing_that_is_taken_away_again_is_fetched_again(twin: Callable[..., RunOutcome]) -> None:
+    outcome = twin(fault=hand("pepper", (0.30, 0.14), look=2))
+    assert [record.verdict for record in outcome.result.subtasks] == ["failure", "success"]
+    assert outcome.achieved
+
+
+@pytest.mark.slow
+def test_what_cannot_be_reached_is_refused_before_anything_moves(
+    twin: Callable[..., RunOutcome], tmp_path: Path
+) -> None:
+    scene = tmp_path / "edge.yaml"
+    scene.write_text(
+        "objects:\n"
+        "  - {name: plate, kind: plate, place: {at: [0.28, 0.24]}}\n"
+        "  - {name: carrot, kind: carrot, place: {at: [0.25, -0.1], yaw: 0}}\n"
+    )
+    outcome = twin("put the carrot right of the plate", scene=scene)
+    assert outcome.result.verdict is RunVerdict.CANNOT
+    assert outcome.achieved is None
+    assert all(record.outcome.stage == "planning" for record in outcome.result.subtasks)
+    assert "workspace" in outcome.result.reason or "reach" in outcome.result.reason
