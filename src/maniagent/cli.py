@@ -107,7 +107,7 @@ def tasks(as_json: Json = False) -> None:
             fields = ("name", "title", "instruction", "suite", "needs_model")
             print_json([{field: getattr(task, field) for field in fields} for task in listed])
             return
-        rows = [(task.name, task.suite, task.instruction, "yes" if task.needs_model else "no") for task in listed]
+        rows = [(task.name, task.suite, task.sayable, "yes" if task.needs_model else "no") for task in listed]
         print_table(("task", "suite", "instruction", "needs a model"), rows)
 
 

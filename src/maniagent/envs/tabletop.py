@@ -24,6 +24,7 @@ from .objects import ObjectModel, attach
 from .offscreen import OffscreenRenderer
 from .scene import Placement, Scene, place_objects
 from .studio import add_studio
+from .viewer import LiveView, require_screen
 
 JOINTS = ("waist", "shoulder", "elbow", "forearm_roll", "wrist_angle", "wrist_rotate")
 TIMESTEP = 0.002
@@ -73,6 +74,8 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         render_mode: str = "rgb_array",
         period: float = 0.02,
     ) -> None:
+        if render_mode == "human":
+            require_screen()
         self.scene = scene
         self.cameras = tuple(cameras)
         self.noise = noise
@@ -90,7 +93,7 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         self._gripper_actuator = int(self.model.actuator("gripper").id)
         self._of_robot = self.model.body_rootid == self.model.body("base_link").id
         self._renderer: OffscreenRenderer | None = None
-        self._viewer: Any = None
+        self._view: LiveView | None = None
         self._declare_spaces()
 
     def _compile(self) -> mujoco.MjModel:
@@ -174,9 +177,9 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         if self._renderer is not None:
             self._renderer.close()
             self._renderer = None
-        if self._viewer is not None:
-            self._viewer.close()
-            self._viewer = None
+        if self._view is not None:
+            self._view.close()
+            self._view = None
 
     def _gym_observation(self) -> dict[str, Any]:
         observation = self.observe()
@@ -196,7 +199,8 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         self.data.ctrl[self._gripper_actuator] = opening / 2 + PAD_INSET
         mujoco.mj_step(self.model, self.data, self._substeps)
         if self.render_mode == "human":
-            self._show()
+            self._view = self._view or LiveView(self.model, self.data)
+            self._view.show()
 
     def settle(self, seconds: float) -> None:
         """Simulate with the targets as they are: time for things to come to rest."""
@@ -268,10 +272,3 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         if self._renderer is None:
             self._renderer = OffscreenRenderer(self.model)
         return self._renderer.render(self.data, camera.name, camera.width, camera.height, depth=depth)
-
-    def _show(self) -> None:
-        if self._viewer is None:
-            from mujoco import viewer
-
-            self._viewer = viewer.launch_passive(self.model, self.data, show_left_ui=False, show_right_ui=False)
-        self._viewer.sync()

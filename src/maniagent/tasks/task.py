@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import re
+import re
 from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from pathlib import Path
@@ -70,6 +71,11 @@ class Task(BaseModel):
         if missing := wanted - set(self.points):
             raise ValueError(f"no point is named {', '.join(sorted(missing))}")
         return self
+
+    @property
+    def sayable(self) -> str:
+        """The instruction with coordinates to be drawn as "(x, y)"."""
+        return re.sub(r"\{\w+\}", "(x, y)", self.instruction)
 
     @property
     def scene(self) -> Scene:
