@@ -18,10 +18,11 @@ from typer.testing import CliRunner
 
 from maniagent.app import RunOutcome, run
 from maniagent.cli import app
+from maniagent.console.journal import read_lines
 from maniagent.envs.tabletop import TabletopEnv
 from maniagent.errors import UsageError
 from maniagent.geometry import FloatArray
-from maniagent.types import CameraFrame, Observation, RunVerdict
+from maniagent.types import CameraFrame, Event, Observation, RobotState, RunVerdict
 
 Fault = Callable[[TabletopEnv, Observation, int], Observation]
 """Twin, what its cameras show, the how-manieth look this is (from 1): what the robot gets to see."""
@@ -67,10 +68,10 @@ def twin(monkeypatch: pytest.MonkeyPatch) -> Callable[..., RunOutcome]:
 
     def carry_out(
         instruction: str | None = None, *, task: str = "pepper-on-plate", fault: Fault = no_fault, grip: float = 1.0,
-        **options: Any,
+        kind: type[Twin] = Twin, **options: Any,
     ) -> RunOutcome:  # fmt: skip
-        kind = type("FaultyTwin", (Twin,), {"fault": staticmethod(fault), "grip": grip})
-        monkeypatch.setattr("maniagent.app.TabletopEnv", kind)
+        faulty = type("FaultyTwin", (kind,), {"fault": staticmethod(fault), "grip": grip})
+        monkeypatch.setattr("maniagent.app.TabletopEnv", faulty)
         which = {} if "scene" in options else {"task": task}
         outcome = run(instruction, **which, **options)
         positions, velocities, home = Twin.latest.arm
@@ -323,6 +324,77 @@ def test_a_thing_that_is_taken_away_again_is_fetched_again(twin: Callable[..., R
     outcome = twin(fault=hand("pepper", (0.30, 0.14), look=2))
     assert [record.verdict for record in outcome.result.subtasks] == ["failure", "success"]
     assert outcome.achieved
+
+
+class WeakGripper(Twin):
+    """Fingers without force."""
+
+    def __init__(self, *arguments: Any, **options: Any) -> None:
+        super().__init__(*arguments, **options)
+        servo = self.model.actuator("gripper").id
+        self.model.actuator_gainprm[servo] = self.model.actuator_biasprm[servo] = 0.0
+
+
+class LostServo(Twin):
+    """The elbow's servo stops answering after the first look."""
+
+    def robot_state(self) -> RobotState:
+        state = super().robot_state()
+        if not self.looks:
+            return state
+        return replace(state, joint_positions=[*state.joint_positions[:2], np.nan, *state.joint_positions[3:]])
+
+    def close(self) -> None:
+        self.looks = 0
+        super().close()
+
+
+class StuckShoulder(Twin):
+    """A shoulder that doesn't turn."""
+
+    def advance(self, joint_positions: FloatArray, opening: float) -> None:
+        super().advance(np.array([joint_positions[0], self.home[1], *joint_positions[2:]]), opening)
+
+
+@pytest.mark.slow
+@pytest.mark.parametrize(
+    ("kind", "said"),
+    [
+        (WeakGripper, "closed on nothing"),
+        (LostServo, "A servo reads no valid position"),
+        (StuckShoulder, "off its path, mostly at the shoulder"),
+    ],
+)
+def test_a_broken_arm_is_noticed_and_named(twin: Callable[..., RunOutcome], kind: type[Twin], said: str) -> None:
+    outcome = twin("put the carrot on the plate", task="carrot-on-plate", seed=3, kind=kind)
+    assert outcome.result.verdict is RunVerdict.CANNOT
+    assert said in outcome.result.reason
+
+
+class Interrupting:
+    """Somebody presses Ctrl-C during a move."""
+
+    def __init__(self, frames: int) -> None:
+        self.frames_left = frames
+
+    def on_event(self, event: Event) -> None:
+        self.frames_left -= event.kind == "frame"
+        if self.frames_left == 0:
+            raise KeyboardInterrupt
+
+
+@pytest.mark.slow
+def test_ctrl_c_stops_the_arm_where_it_is_and_leaves_a_folder_that_can_be_read(
+    monkeypatch: pytest.MonkeyPatch, tmp_path: Path
+) -> None:
+    monkeypatch.setattr("maniagent.app.TabletopEnv", Twin)
+    with pytest.raises(KeyboardInterrupt):
+        run(task="carrot-on-plate", seed=3, out=tmp_path / "run", observers=[Interrupting(20)])
+    positions, velocities, home = Twin.latest.arm
+    assert np.abs(velocities).max() < 0.1, "the arm is at rest"
+    assert np.abs(positions - home).max() > 0.1, "it was on its way"
+    assert read_lines(tmp_path / "run" / "events.jsonl")[-1]["kind"] == "move"
+    assert (tmp_path / "run" / "report.html").exists()
 
 
 @pytest.mark.slow

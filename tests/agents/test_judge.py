@@ -119,6 +119,13 @@ def test_a_pile_of_one_colour_as_high_as_both_is_a_stack() -> None:
     assert verdict(stack, tried(small, BLUE), BLUE) is Verdict.FAILURE
 
 
+def test_a_taller_thing_on_the_target_hides_nothing() -> None:
+    spoon = made_object(0, "spoon", (0.2, 0.1), size=(0.15, 0.03, 0.01), colour=(170, 170, 175))
+    egg = at(made_object(0, "egg", size=(0.05, 0.04, 0.04), colour=(230, 200, 170)), 0.30, -0.10, 0.008)
+    dropped = at(spoon, 0.25, 0.2)
+    assert verdict(put(Relation.ON), tried(spoon, PLATE), PLATE, egg, dropped) is Verdict.FAILURE
+
+
 # beside ---------------------------------------------------------------------------------------------------------
 
 BESIDE = [Relation.NEXT_TO, Relation.LEFT_OF, Relation.RIGHT_OF, Relation.IN_FRONT_OF, Relation.BEHIND]

@@ -130,10 +130,11 @@ def _rests_on(thing: ObjectInfo, moved: ObjectInfo, target: ObjectInfo) -> bool:
 
 def _is_hidden_below(moved: ObjectInfo, target: ObjectInfo, now: Sequence[ObjectInfo]) -> bool:
     """Whether a pile as high as both stands where the target stood: seen as one thing, both of a colour or not."""
-    height = target.top_z + 0.6 * moved.extent[2]
+    height = moved.extent[2]
+    lowest, highest = target.top_z + 0.6 * height, target.top_z + 1.4 * height + 0.005
     return any(
         float(np.linalg.norm(thing.centre[:2] - target.centre[:2])) < max(target.extent[1] / 2, 0.01)
-        and thing.top_z > height
+        and lowest < thing.top_z < highest
         for thing in now
     )
 
