@@ -19,7 +19,7 @@ from .errors import UsageError
 from .robots.robot import Robot
 from .robots.simulated import SimulatedRobot
 from .tasks import Task, get, load_task
-from .types import RunResult
+from .types import RunResult, RunVerdict
 
 
 REST_SECONDS = 1.0
@@ -104,7 +104,12 @@ def _carry_out(
     """Run the loop; what is true is asked only when the agents are through."""
     agents = rules_agents(robot.covers)
     log.emit("run_started", instruction=instruction, task=task, seed=seed, agents=agents.name)
-    result = AgentLoop(robot, agents, log).run(instruction)
+    try:
+        result = AgentLoop(robot, agents, log).run(instruction)
+    except KeyboardInterrupt:
+        aborted = RunResult(instruction, RunVerdict.ABORTED, "Stopped by hand; the arm stands still.", (), {})
+        log.emit("run_finished", result=aborted, achieved=None)
+        raise
     achieved = achieved_now()
     log.emit("run_finished", result=result, achieved=achieved)
     return result, achieved
