@@ -14,10 +14,13 @@ from dataclasses import dataclass
 import numpy as np
 from numpy.typing import NDArray
 
-from ..geometry import FloatArray, make_transform, rotation_z, top_down_rotation, wrap_angle
+from ..geometry import FloatArray, make_transform, top_down_rotation, wrap_angle
 from ..types import BoolArray, GraspPose
 from .heightmap import HeightMap
 from .segments import Segment
+
+LARGE = 900
+"""Cells of an upper surface from which on every other row and column is enough."""
 
 
 @dataclass(frozen=True)
@@ -76,12 +79,9 @@ def propose_grasps(
     if len(surface) < 4:
         return ()
     centres = _spread_out(surface, tuning.centres)
-    # At yaw 0 the closing axis is base +y, which lies across an object whose long side is along base +x.
-    yaws = segment.yaw + np.arange(tuning.yaws) * np.pi / tuning.yaws
-    sections = [_sections(yaw, centres, surface, segment, gripper, tuning) for yaw in yaws]
-    found = _Candidates.concatenate([part for parts in sections for part in parts])
+    found = _sections(centres, surface, segment, gripper, tuning)
     found = found.take(_closes(found, gripper, tuning))
-    found = found.take(_has_room(found, grid, gripper, tuning))
+    found = _with_room(found, grid, gripper, tuning)
     return _best(found, segment, gripper, tuning)
 
 
@@ -124,74 +124,94 @@ class _Candidates:
 
 def _surface(segment: Segment, grid: HeightMap) -> FloatArray:
     """(N, 3) the segment's upper surface, one point a cell; every other one of a large object."""
-    cells = np.unique(grid.cells(segment.points), axis=0)
-    stride = 1 if len(cells) < 900 else 2
-    cells = cells[(cells % stride == 0).all(axis=1)]
-    heights = grid.height[cells[:, 0], cells[:, 1]]
+    seen = np.zeros(grid.height.shape, bool)
+    seen[tuple(grid.cells(segment.points).T)] = True
+    rows, columns = np.nonzero(seen)
+    if len(rows) >= LARGE:
+        coarse = (rows % 2 == 0) & (columns % 2 == 0)
+        rows, columns = rows[coarse], columns[coarse]
+    heights = grid.height[rows, columns]
     keep = heights > segment.support_z + 0.002
-    return np.column_stack([grid.positions(cells[:, 0], cells[:, 1]), heights])[keep]
+    return np.column_stack([grid.positions(rows, columns), heights])[keep]
 
 
 def _spread_out(surface: FloatArray, count: int) -> FloatArray:
     """(<= count, 3) points spread evenly over a surface: each the farthest from those before."""
-    chosen = [int(np.argmin(np.linalg.norm(surface[:, :2] - surface[:, :2].mean(axis=0), axis=1)))]
+    xy = surface[:, :2]
+    distance = np.linalg.norm(xy - xy.mean(axis=0), axis=1)
+    chosen = [int(distance.argmin())]
     distance = np.full(len(surface), np.inf)
     while len(chosen) < min(count, len(surface)):
-        distance = np.minimum(distance, np.linalg.norm(surface[:, :2] - surface[chosen[-1], :2], axis=1))
+        offset = xy - xy[chosen[-1]]
+        distance = np.minimum(distance, np.einsum("ij,ij->i", offset, offset))
         chosen.append(int(distance.argmax()))
     return surface[chosen]
 
 
 def _sections(
-    yaw: float,
-    centres: FloatArray,
-    surface: FloatArray,
-    segment: Segment,
-    gripper: GripperShape,
-    tuning: GraspTuning,
-) -> list[_Candidates]:
-    """The cross-sections at every centre for one closing direction, at one or two depths."""
-    to_gripper = rotation_z(yaw)[:2, :2]  # columns: u, v
-    at, of = surface[:, :2] @ to_gripper, centres[:, :2] @ to_gripper
-    near = (np.abs(at[:, 0] - of[:, 0, None]) < tuning.strip) & (np.abs(at[:, 1] - of[:, 1, None]) < tuning.window)
-    owner, member = np.nonzero(near)  # pairs: which centre, which point
-    du, dv = (at[member] - of[owner]).T
-    z = surface[member, 2]
-    central = np.abs(dv) < tuning.strip
-    top = _largest(z[central], owner[central], len(centres))
+    centres: FloatArray, surface: FloatArray, segment: Segment, gripper: GripperShape, tuning: GraspTuning
+) -> _Candidates:
+    """The cross-sections at every centre for every closing direction, at one or two depths each."""
+    # At yaw 0 the closing axis is base +y, which lies across an object whose long side is along base +x.
+    yaws = segment.yaw + np.arange(tuning.yaws) * np.pi / tuning.yaws
+    owner, du, dv, z = _strips(yaws, centres, surface, tuning)
+    yaw, middle = np.repeat(yaws, len(centres)), np.tile(centres[:, :2], (len(yaws), 1))
+    top = _largest(z, owner, len(yaw), np.abs(dv) < tuning.strip)
     clearance = np.where(top - segment.support_z < 0.014, tuning.tip_clearance / 2, tuning.tip_clearance)
     deep = np.maximum(segment.support_z + clearance, top - gripper.palm_height + 0.003)
     # As deep as table and palm allow; and, for walls and rims, just over the edge.
     shallow = np.maximum(deep, top - 0.014)
     parts = []
     for tip in [deep] if (shallow - deep).max() < 0.0015 else [deep, shallow]:
-        inside = z > tip[owner] + 0.001
-        low, high, slope = _flanks(du[inside], dv[inside], owner[inside], len(centres), tuning)
+        low, high, slope = _flanks(du, dv, owner, len(yaw), z > tip[owner] + 0.001, tuning)
         with np.errstate(invalid="ignore"):
-            origin = centres[:, :2] + ((low + high) / 2)[:, None] * to_gripper[:, 1]
-            parts.append(_Candidates(origin, tip, np.full(len(centres), yaw), high - low, slope, top - tip))
-    return parts
+            off = ((low + high) / 2)[:, None] * np.stack([-np.sin(yaw), np.cos(yaw)], axis=-1)
+        parts.append(_Candidates(middle + off, tip, yaw, high - low, slope, top - tip))
+    return _Candidates.concatenate(parts)
+
+
+def _strips(
+    yaws: FloatArray, centres: FloatArray, surface: FloatArray, tuning: GraspTuning
+) -> tuple[NDArray[np.intp], FloatArray, FloatArray, FloatArray]:
+    """What of the surface lies between the pads: a pair (section, point) an entry.
+
+    Returns (P,) each: the section, numbered closing direction by closing direction, and the point's offset from the
+    section's centre across the fingers (u) and along the closing axis (v), and its height, m.
+    """
+    c, s = np.cos(yaws).astype(np.float32), np.sin(yaws).astype(np.float32)
+    xy, middles = surface[:, :2].T.astype(np.float32), centres[:, :2].T.astype(np.float32)
+
+    def offsets(axes: NDArray[np.float32]) -> NDArray[np.float32]:
+        """(yaws, centres, points)."""
+        return (axes @ xy)[:, None, :] - (axes @ middles)[:, :, None]
+
+    du, dv = offsets(np.stack([c, s], axis=-1)), offsets(np.stack([-s, c], axis=-1))
+    between = (np.abs(du) < tuning.strip) & (np.abs(dv) < tuning.window)
+    section, point = np.nonzero(between.reshape(-1, len(surface)))
+    return section, du[between], dv[between], surface[point, 2]
 
 
 def _flanks(
-    du: FloatArray, dv: FloatArray, owner: NDArray[np.intp], count: int, tuning: GraspTuning
+    du: FloatArray, dv: FloatArray, owner: NDArray[np.intp], count: int, inside: BoolArray, tuning: GraspTuning
 ) -> tuple[FloatArray, FloatArray, FloatArray]:
     """Lowest and highest v of each cross-section, and the slope of its flanks, from the strip's two halves.
 
     Nothing is finite where a half is empty: the fingers would close on a corner.
     """
-    first = du < 0
+    first, second = inside & (du < 0), inside & (du >= 0)
+    low_a, high_a = -_largest(-dv, owner, count, first), _largest(dv, owner, count, first)
+    low_b, high_b = -_largest(-dv, owner, count, second), _largest(dv, owner, count, second)
     with np.errstate(invalid="ignore"):
-        low_a, high_a = -_largest(-dv[first], owner[first], count), _largest(dv[first], owner[first], count)
-        low_b, high_b = -_largest(-dv[~first], owner[~first], count), _largest(dv[~first], owner[~first], count)
         slope = np.maximum(np.abs(low_a - low_b), np.abs(high_a - high_b)) / tuning.strip
     return np.minimum(low_a, low_b), np.maximum(high_a, high_b), slope
 
 
-def _largest(values: FloatArray, owner: NDArray[np.intp], count: int) -> FloatArray:
-    """(count,) the largest value of each owner; minus infinity where it has none."""
+def _largest(values: FloatArray, owner: NDArray[np.intp], count: int, where: BoolArray) -> FloatArray:
+    """(count,) the largest value of each owner (ascending) where asked for; minus infinity where it has none."""
+    bounds = np.searchsorted(owner, np.arange(count + 1))
+    some = bounds[1:] > bounds[:-1]
     out = np.full(count, -np.inf)
-    np.maximum.at(out, owner, values)
+    out[some] = np.maximum.reduceat(np.where(where, values, -np.inf), bounds[:-1][some])
     return out
 
 
@@ -202,20 +222,18 @@ def _closes(found: _Candidates, gripper: GripperShape, tuning: GraspTuning) -> B
         return fits & (found.width > 0) & (found.slope < tuning.friction) & (found.overlap >= tuning.min_overlap)
 
 
-def _has_room(found: _Candidates, grid: HeightMap, gripper: GripperShape, tuning: GraspTuning) -> BoolArray:
-    """(N,) whether nothing stands where the open fingers, their knuckles and the palm go."""
-    free = np.ones(len(found.tip), bool)
-    half_opening = found.opening(gripper, tuning)[:, None] / 2
+def _with_room(found: _Candidates, grid: HeightMap, gripper: GripperShape, tuning: GraspTuning) -> _Candidates:
+    """Those for which nothing stands where the open fingers, their knuckles and the palm go."""
     for thickness, half_width, height in (
         (gripper.finger_thickness, gripper.finger_half_width, 0.0),
         (gripper.knuckle_thickness, gripper.knuckle_half_width, gripper.knuckle_height),
     ):
-        v = half_opening + np.linspace(0.001, thickness, 4)
+        v = found.opening(gripper, tuning)[:, None] / 2 + np.linspace(0.001, thickness, 4)
         both = np.concatenate([-v, v], axis=1)
-        free &= _highest(found, both, half_width, grid) < found.tip + height
+        found = found.take(_highest(found, both, half_width, grid) < found.tip + height)
     span = np.linspace(-gripper.palm_half_span, gripper.palm_half_span, 12)
     palm = np.broadcast_to(span, (len(found.tip), len(span)))
-    return free & (_highest(found, palm, gripper.palm_half_width, grid) < found.tip + gripper.palm_height)
+    return found.take(_highest(found, palm, gripper.palm_half_width, grid) < found.tip + gripper.palm_height)
 
 
 def _highest(found: _Candidates, v: FloatArray, half_width: float, grid: HeightMap) -> NDArray[np.floating]:

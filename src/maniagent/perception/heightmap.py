@@ -8,6 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 from dataclasses import dataclass
+from functools import cached_property
 
 import cv2
 import numpy as np
@@ -39,13 +40,15 @@ class HeightMap:
 
     def cells(self, points: NDArray[np.floating]) -> NDArray[np.intp]:
         """Rows and columns (..., 2) of points (..., 2 or 3), clipped to the grid."""
-        index = np.floor((points[..., :2] - np.asarray(self.origin)) / self.cell).astype(np.intp)
-        return np.clip(index, 0, np.asarray(self.height.shape) - 1)
+        # Truncation differs from floor only off the grid, where clipping makes up for it.
+        index = ((points[..., :2] - self.origin) / self.cell).astype(np.intp)
+        return np.clip(index, 0, np.subtract(self.height.shape, 1))
 
     def positions(self, rows: NDArray[np.intp], columns: NDArray[np.intp]) -> NDArray[np.float64]:
         """(..., 2) m, base frame: centres of these cells."""
         return (np.stack([rows, columns], axis=-1) + 0.5) * self.cell + np.asarray(self.origin)
 
+    @cached_property
     def lab(self) -> NDArray[np.float32]:
         """(X, Y, 3) CIE Lab (8-bit scale), lightly smoothed inside what is occupied, lightness scaled down."""
         weight = np.maximum(cv2.blur(self.occupied.astype(np.float32), (3, 3)), 1e-6)
@@ -72,12 +75,11 @@ def build_height_map(views: Sequence[ViewPoints], workspace: Workspace, cell: fl
         index = ((points[:, :2] - np.array(origin, np.float32)) / np.float32(cell)).astype(np.int32)
         np.clip(index, 0, np.array(shape, np.int32) - 1, out=index)
         flat = index[:, 0] * shape[1] + index[:, 1]
-        # Written in ascending order of height, the topmost point of each cell comes last and stays.
-        order = np.argsort(points[:, 2], kind="stable")
-        flat, points, colours = flat[order], points[order], colours[order]
-        height.ravel()[flat] = np.maximum(points[:, 2], 0.0)
-        rgb.reshape(-1, 3)[flat] = colours
-        occupied.ravel()[flat] = True
+        heights = np.maximum(points[:, 2], np.float32(0))
+        np.maximum.at(height.reshape(-1), flat, heights)
+        topmost = heights == height.reshape(-1)[flat]
+        rgb.reshape(-1, 3)[flat[topmost]] = colours[topmost]
+        occupied.reshape(-1)[flat] = True
     return _close_gaps(HeightMap(origin, cell, height, rgb, occupied))
 
 

@@ -62,16 +62,16 @@ def segment(
     """
     views = foreground(observation, covers_robot, workspace, tuning)
     grid = build_height_map(views, workspace)
-    labels = merge_regions(_split(grid), grid)
-    supports = _supports(labels, grid)
-    segments = _cut(views, labels, supports, grid)
+    labels = merge_regions(split_regions(grid), grid)
+    supports = find_supports(labels, grid)
+    segments = cut_segments(views, labels, supports, grid)
     order = np.argsort([s.centre[1] for s in segments], kind="stable")
     return TableView(tuple(segments[i] for i in order), grid)
 
 
-def _split(grid: HeightMap) -> Labels:
+def split_regions(grid: HeightMap) -> Labels:
     """Seeds between the edges, grown by a watershed."""
-    lab = grid.lab()
+    lab = grid.lab
     edges = np.zeros(grid.occupied.shape, bool)
     inside = slice(EDGE_SPAN, -EDGE_SPAN)
     before, after = slice(None, -2 * EDGE_SPAN), slice(2 * EDGE_SPAN, None)
@@ -82,7 +82,8 @@ def _split(grid: HeightMap) -> Labels:
         ((before, after), (after, before), (inside, inside)),
     ):
         both = grid.occupied[low] & grid.occupied[high]
-        colour = np.linalg.norm(lab[low] - lab[high], axis=-1) > COLOUR_STEP
+        difference = lab[low] - lab[high]
+        colour = np.einsum("xyc,xyc->xy", difference, difference) > COLOUR_STEP**2
         step = np.abs(grid.height[low] - grid.height[high]) > HEIGHT_STEP
         edges[middle] |= both & (colour | step)
     seeds = (grid.occupied & ~edges).astype(np.uint8)
@@ -112,18 +113,20 @@ def _seed_the_unseeded(markers: Labels, occupied: BoolArray, first: int) -> Labe
 
 
 def _fill_ridges(labels: Labels, occupied: BoolArray) -> Labels:
-    """Give the watershed's ridge cells (-1) to a neighbour."""
+    """Give the watershed's ridges (-1), and edges that the table flooded (0), to their neighbours."""
     out = np.maximum(labels, 0).astype(np.int32)
-    for _ in range(3):
-        missing = occupied & (out == 0)
-        if not missing.any():
-            break
+    missing = occupied & (out == 0)
+    while missing.any():
         spread = cv2.dilate(out.astype(np.float32), np.ones((3, 3), np.uint8)).astype(np.int32)
         out[missing] = spread[missing]
+        still = occupied & (out == 0)
+        if still.sum() == missing.sum():  # an island of its own, too small for a region
+            break
+        missing = still
     return out
 
 
-def _supports(labels: Labels, grid: HeightMap) -> Mapping[int, tuple[float, int]]:
+def find_supports(labels: Labels, grid: HeightMap) -> Mapping[int, tuple[float, int]]:
     """By region: the height (m) it rests on, and which region that is (0: the table).
 
     A region rests on another where most of its border is with that one, and higher than it.
@@ -143,7 +146,7 @@ def _supports(labels: Labels, grid: HeightMap) -> Mapping[int, tuple[float, int]
     return supports
 
 
-def _cut(
+def cut_segments(
     views: tuple[ViewPoints, ...], labels: Labels, supports: Mapping[int, tuple[float, int]], grid: HeightMap
 ) -> list[Segment]:
     """The points of every region, from all views, and its mask in each."""

@@ -10,7 +10,7 @@ import numpy as np
 from numpy.typing import NDArray
 
 from ..errors import CameraFailure
-from ..geometry import backproject, transform_points
+from ..geometry import transform_points
 from ..types import BoolArray, CameraFrame, Observation, RobotState
 
 RobotFilter = Callable[[NDArray[np.float32], RobotState], BoolArray]
@@ -86,23 +86,36 @@ def _view_foreground(
     # The median takes out most of the depth noise and keeps edges; it can't handle NaN, zero stands for it.
     known = np.isfinite(frame.depth) & (frame.depth > 0)
     depth = np.asarray(cv2.medianBlur(np.where(known, frame.depth, np.float32(0)), 5), np.float32)
-    known &= depth > 0
-    points = transform_points(frame.T_base_camera.astype(np.float32), backproject(frame.K, depth))
-    inside = known.copy()
-    for axis, (low, high) in enumerate((workspace.x, workspace.y, workspace.z)):
-        inside &= (points[..., axis] > low) & (points[..., axis] < high)
+    x, y, z = _base_coordinates(frame, np.where(known & (depth > 0), depth, np.float32(np.nan)))
+    inside = _within(x, workspace.x) & _within(y, workspace.y) & _within(z, workspace.z)
     _check_view(frame, inside, workspace, tuning)
-    plane = _fit_table(frame.name, points[inside][::37], tuning)
-    height = points[..., 2] - (plane[0] * points[..., 0] + plane[1] * points[..., 1] + plane[2])
+    coarse = (slice(None, None, 6), slice(None, None, 6))  # a plane needs no more
+    chosen = inside[coarse]
+    a, b, c = _fit_table(frame.name, np.stack([x[coarse][chosen], y[coarse][chosen], z[coarse][chosen]], -1), tuning)
+    height = z - (a * x + b * y + c)
     coloured = _off_colour(frame.rgb, inside & (np.abs(height) < 0.004), tuning)
-    candidates = np.flatnonzero(inside & ((height > tuning.height) | (coloured & (height > -tuning.height))))
-    candidate_points = points.reshape(-1, 3)[candidates]
-    candidate_points[:, 2] = height.ravel()[candidates]
-    keep = ~covers_robot(candidate_points, robot)
-    chosen = candidates[keep]
-    return ViewPoints(
-        frame.name, frame.depth.shape, chosen, candidate_points[keep], frame.rgb.reshape(-1, 3)[chosen]
-    )  # fmt: skip
+    pixels = np.flatnonzero(inside & ((height > tuning.height) | (coloured & (height > -tuning.height))))
+    points = np.stack([x.ravel()[pixels], y.ravel()[pixels], height.ravel()[pixels]], axis=-1)
+    keep = ~covers_robot(points, robot)
+    colours = frame.rgb.reshape(-1, 3)[pixels[keep]]
+    return ViewPoints(frame.name, frame.depth.shape, pixels[keep], points[keep], colours)
+
+
+def _base_coordinates(frame: CameraFrame, depth: NDArray[np.float32]) -> NDArray[np.float32]:
+    """(3, H, W) m: x, y and z in the base frame of every pixel, NaN where the depth (H, W) is.
+
+    One plane a coordinate, not one triple a pixel: everything that follows is faster on them.
+    """
+    height, width = depth.shape
+    u = (np.arange(width) - frame.K[0, 2]) / frame.K[0, 0]
+    v = (np.arange(height) - frame.K[1, 2]) / frame.K[1, 1]
+    right, down, forward, origin = frame.T_base_camera[:3, :, None, None].astype(np.float32).swapaxes(0, 1)
+    rays = right * u.astype(np.float32) + (down * v.astype(np.float32)[:, None] + forward)
+    return rays * depth + origin
+
+
+def _within(values: NDArray[np.float32], bounds: tuple[float, float]) -> BoolArray:
+    return (values > bounds[0]) & (values < bounds[1])
 
 
 def _off_colour(rgb: NDArray[np.uint8], on_plane: BoolArray, tuning: Tuning) -> BoolArray:
@@ -113,7 +126,8 @@ def _off_colour(rgb: NDArray[np.uint8], on_plane: BoolArray, tuning: Tuning) -> 
     height, width = on_plane.shape
     half = cv2.resize(rgb, (width // 2, height // 2), interpolation=cv2.INTER_AREA)
     lab = cv2.cvtColor(half, cv2.COLOR_RGB2LAB).astype(np.float32)
-    table = np.median(lab[on_plane[: height // 2 * 2 : 2, : width // 2 * 2 : 2]], axis=0)
+    sample = on_plane[: height // 2 * 2 : 8, : width // 2 * 2 : 8]
+    table = np.median(lab[::4, ::4][sample], axis=0)
     lightness = lab[..., 0]
     # In shadow a surface loses chroma along with lightness (128 is grey in 8-bit Lab).
     shade = np.minimum(lightness / max(table[0], 1.0), np.float32(1.2))[..., None]
@@ -141,7 +155,7 @@ def _check_view(frame: CameraFrame, inside: BoolArray, workspace: Workspace, tun
         )
 
 
-def _fit_table(name: str, points: NDArray[np.float32], tuning: Tuning) -> NDArray[np.float64]:
+def _fit_table(name: str, points: NDArray[np.float32], tuning: Tuning) -> NDArray[np.float32]:
     """Coefficients (a, b, c) of the table plane z = a x + b y + c, by least squares with shrinking tolerance."""
     plane = np.zeros(3)
     A = np.column_stack([points[:, :2], np.ones(len(points))]).astype(np.float64)
@@ -150,4 +164,4 @@ def _fit_table(name: str, points: NDArray[np.float32], tuning: Tuning) -> NDArra
         if near.sum() < 100:
             raise CameraFailure(f"The {name} camera sees no table at the height the calibration says.")
         plane, *_ = np.linalg.lstsq(A[near], points[near, 2].astype(np.float64), rcond=None)
-    return plane
+    return plane.astype(np.float32)
