@@ -21,7 +21,6 @@ from .robots.simulated import SimulatedRobot
 from .tasks import Task, get, load_task
 from .types import RunResult, RunVerdict
 
-
 REST_SECONDS = 1.0
 """Robot time between the arm's coming home and the verdict on true state: whatever rolls has come to rest."""
 
