@@ -8,7 +8,7 @@ from __future__ import annotations
 
 from collections.abc import Callable, Iterator, Sequence
 from dataclasses import dataclass
-from itertools import pairwise
+from itertools import combinations, pairwise
 
 import cv2
 import numpy as np
@@ -32,6 +32,8 @@ TINY = 1.8e-4
 """m^2; a part, never an object."""
 SMALL = 5e-4
 """m^2; next to something larger, a part: a stem, a handle's knob."""
+STOREY = 0.015
+"""m; what is that much higher than its surroundings stands on them, or beside them."""
 ELONGATED = 2.4
 """Length over width from which end-to-end parts may make one tool, fruit or pen."""
 REACH = 8
@@ -56,6 +58,13 @@ class _Region:
     """m, 90th percentile of its height."""
     basin: int
     """Number of the basin it is part of, as its bottom or its wall; 0 for none."""
+
+
+def _same_hue(a: _Region, b: _Region) -> bool:
+    """One colour but for the light: in shade, chroma fades along with lightness."""
+    dark, bright = sorted((a.colour, b.colour), key=lambda lab: float(lab[0]))
+    faded = (bright[1:] - 128.0) * dark[0] / max(float(bright[0]), 1.0)
+    return float(np.linalg.norm(dark[1:] - 128.0 - faded)) < SAME_HUE
 
 
 @dataclass(frozen=True, eq=False)
@@ -86,10 +95,7 @@ class _Border:
 
     @property
     def same_hue(self) -> bool:
-        """One colour but for the light: in shade, chroma fades along with lightness."""
-        dark, bright = sorted((self.small.colour, self.large.colour), key=lambda lab: float(lab[0]))
-        faded = (bright[1:] - 128.0) * dark[0] / max(float(bright[0]), 1.0)
-        return float(np.linalg.norm(dark[1:] - 128.0 - faded)) < SAME_HUE
+        return _same_hue(self.small, self.large)
 
     @property
     def colourful(self) -> bool:
@@ -143,6 +149,8 @@ def _cloth(border: _Border) -> bool:
 def _attachment(border: _Border) -> bool:
     """A stem, a beak, a leaf: tiny, or small and at the edge of what it grows from, not on it."""
     small, large = border.small.area, border.large.area
+    if border.step > STOREY:
+        return False
     if small < TINY:
         return border.share > 0.05
     if border.lies_on_cloth:
@@ -197,15 +205,17 @@ def _agreeing(graph: _Graph) -> list[tuple[int, int]]:
 
 
 def _parted(graph: _Graph) -> tuple[int, int] | None:
-    """Two pieces of one cloth that something lying across it parts: flat, and beside the same thing."""
+    """Two pieces of one thing that something on it parts: pieces of a cloth, or of what a storey stands on."""
     beside: dict[int, list[int]] = {}
     for (a, b), _ in graph.borders():
-        for flat, other in ((a, b), (b, a)):
-            if graph.regions[flat].top < FLAT < graph.regions[other].top:
-                beside.setdefault(other, []).append(flat)
+        for low, high in ((a, b), (b, a)):
+            if graph.regions[low].top < FLAT < graph.regions[high].top or graph.carries(low, high):
+                beside.setdefault(high, []).append(low)
     for pieces in beside.values():
-        if len(pieces) > 1:
-            return pieces[0], pieces[1]
+        for a, b in combinations(pieces, 2):
+            cloth = max(graph.regions[a].top, graph.regions[b].top) < FLAT
+            if cloth or _same_hue(graph.regions[a], graph.regions[b]):
+                return a, b
     return None
 
 
@@ -261,6 +271,16 @@ class _Graph:
         if self._borders is None:
             self._borders = list(self._find_borders())
         return self._borders
+
+    def carries(self, low: int, high: int) -> bool:
+        """Whether one region may be part of what the other stands on: lower by a storey, and a corner or all around."""
+        if self.regions[high].top < self.regions[low].top + STOREY:
+            return False
+        if self.regions[low].area < SMALL:
+            return True
+        mine = (self._first == high) | (self._second == high)
+        to_table = mine & ((self._first == 0) | (self._second == 0))
+        return bool(to_table.sum() < 0.4 * mine.sum())
 
     def _find_borders(self) -> Iterator[tuple[tuple[int, int], _Border]]:
         base = int(self.labels.max()) + 1
@@ -318,7 +338,7 @@ class _Graph:
 
 def _basins(grid: HeightMap) -> tuple[Labels, FloatArray]:
     """Hollows that would hold water: their numbers from 1 (X, Y), grown by a wall's width, and their water levels."""
-    kernel = np.ones((3, 3), np.uint8)
+    kernel = np.ones((5, 5), np.uint8)  # a rim has gaps where no camera saw it
     level_of = np.zeros(grid.height.shape, np.float32)
     for level in WATER_LEVELS:
         wall = np.asarray(cv2.morphologyEx((grid.height > level).astype(np.uint8), cv2.MORPH_CLOSE, kernel), np.uint8)

@@ -21,8 +21,8 @@ RobotFilter = Callable[[NDArray[np.float32], RobotState], BoolArray]
 class Workspace:
     """The part of the table that is looked at, base frame, m."""
 
-    x: tuple[float, float] = (0.06, 0.52)
-    y: tuple[float, float] = (-0.36, 0.36)
+    x: tuple[float, float] = (0.02, 0.53)
+    y: tuple[float, float] = (-0.37, 0.37)
     z: tuple[float, float] = (-0.03, 0.30)
 
 
