@@ -402,6 +402,8 @@ class SubtaskRecord:
     """As judged on the following turn; INITIAL until then."""
     evidence: str = ""
     queries: tuple[str, ...] = ()
+    surroundings: tuple[ObjectInfo, ...] = ()
+    """Everything else that was on the table, as it was before the attempt."""
 
 
 @dataclass(frozen=True)

@@ -142,7 +142,7 @@ class _Run:
         except StageFailure as failure:
             self._tell(failure)
             report = ExecutionReport(completed=False, reached=0, reason=str(failure), stage=str(failure.stage))
-            self.memory.add(SubtaskRecord(subtask.text, located.objects, report, queries=subtask.objects))
+            self._remember(subtask, located.objects, located, report)
             return
         with self.timed("execution"):
             report = self.robot.execute(keypoints, boxes)
@@ -152,7 +152,15 @@ class _Run:
         self.log.emit("executed", turn=self.turn, report=report)
         if not report.completed:
             self.log.emit("failed", turn=self.turn, stage=report.stage, reason=report.reason)
-        self.memory.add(SubtaskRecord(subtask.text, objects, report, queries=subtask.objects))
+        self._remember(subtask, objects, located, report)
+
+    def _remember(
+        self, subtask: Subtask, objects: tuple[ObjectInfo, ...], located: Located, report: ExecutionReport
+    ) -> None:
+        record = SubtaskRecord(
+            subtask.text, objects, report, queries=subtask.objects, surroundings=located.surroundings
+        )
+        self.memory.add(record)
 
     def _plan(
         self, subtask: Subtask, located: Located, boxes: Boxes, viewpoint: Viewpoint

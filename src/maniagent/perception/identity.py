@@ -26,7 +26,7 @@ def same_thing(before: ObjectInfo, now: ObjectInfo) -> bool:
     return colour < MAX_COLOUR_DISTANCE and lengths[1] < MAX_SIZE_RATIO * max(lengths[0], 1e-3)
 
 
-def find_again(before: ObjectInfo, now: Sequence[ObjectInfo], within: float) -> ObjectInfo | None:
+def find_again(before: ObjectInfo, now: Sequence[ObjectInfo], within: float = np.inf) -> ObjectInfo | None:
     """The object that looks like `before` and is nearest to where that was, `within` m of it; None without one."""
     alike = [thing for thing in now if same_thing(before, thing)]
     nearest = min(alike, key=lambda thing: _distance(before, thing), default=None)

@@ -199,8 +199,14 @@ def merge_regions(labels: Labels, grid: HeightMap) -> Labels:
 def _agreeing(graph: _Graph) -> list[tuple[int, int]]:
     """All pairs that the surest applicable rule would merge; empty where none applies."""
     for rule in _RULES:
-        if pairs := [pair for pair, border in graph.borders() if rule(border)]:
-            return pairs
+        found = [(pair, border) for pair, border in graph.borders() if rule(border)]
+        if found and rule is _attachment:
+            # A part belongs to one thing: a stem that touches plate and pepper must not make them one.
+            found.sort(key=lambda item: abs(item[1].step))
+            nearest = {id(border.small): pair for pair, border in reversed(found)}
+            return list(nearest.values())
+        if found:
+            return [pair for pair, _ in found]
     return []
 
 

@@ -22,8 +22,8 @@ from .commands import Action, Command
 from .controller import direction_of
 from .language import parse_instruction
 
-REFIND = 0.10
-"""m around its last place within which a retry takes the thing it tried before to be the one meant."""
+UNMOVED = 0.02
+"""m; what looks the same within that of its last place is the same thing."""
 
 
 class RulesObjectAgent:
@@ -69,14 +69,16 @@ class RulesObjectAgent:
         self, i: int, query: str, view: TableView, viewpoint: Viewpoint, attempts: Sequence[SubtaskRecord]
     ) -> int:
         """Index of the segment a query means; on a retry, the thing that was tried before, wherever it went."""
-        for record in reversed(attempts):
-            if len(record.objects) > i:
-                now = [segment.to_object(k, query) for k, segment in enumerate(view.segments)]
-                again = find_again(record.objects[i], now, REFIND)
-                if again is not None:
-                    return again.index
-                break
-        return self._lexicon.ground(query, view.segments, viewpoint)
+        tried = next((record for record in reversed(attempts) if len(record.objects) > i), None)
+        if tried is None:
+            return self._lexicon.ground(query, view.segments, viewpoint)
+        now = [segment.to_object(k, query) for k, segment in enumerate(view.segments)]
+        # A neighbour that looks the same and still lies where it lay is another thing, however near.
+        unmoved = {again.index for other in tried.surroundings if (again := find_again(other, now, UNMOVED))}
+        again = find_again(tried.objects[i], [thing for thing in now if thing.index not in unmoved])
+        if again is None:
+            raise DetectionFailure(f"The {query} that was tried before is out of view.")
+        return again.index
 
 
 def _grasps(
