@@ -201,8 +201,8 @@ class ObjectInfo:
         grasp = ""
         if self.grasp is not None:
             gx, gy, gz = self.grasp.T_base_grasp[:3, 3]
-            closing = self.grasp.T_base_grasp[:3, 1]
-            grasp = f", grasp at ({gx:.3f}, {gy:.3f}, {gz:.3f}) yaw {np.degrees(np.arctan2(-closing[0], closing[1])):.0f} deg"
+            turned = np.degrees(np.arctan2(-self.grasp.T_base_grasp[0, 1], self.grasp.T_base_grasp[1, 1]))
+            grasp = f", grasp at ({gx:.3f}, {gy:.3f}, {gz:.3f}) yaw {turned:.0f} deg"
         return (
             f"[{self.index}] {self.name}: centre ({x:.3f}, {y:.3f}, {z:.3f}) m, "
             f"extent {length:.3f} x {width:.3f} x {height:.3f} m, yaw {np.degrees(self.yaw):.0f} deg{grasp}"

@@ -127,7 +127,7 @@ def test_a_neighbour_that_looks_the_same_is_not_taken_for_the_thing_tried_before
     agent: RulesObjectAgent, found: Located
 ) -> None:
     # The other red pepper still lies where it lay; the one that was tried has gone from the picture.
-    gone = replace(found.objects[0], centre=found.objects[0].centre + [0.0, 0.02, 0.0])
+    gone = replace(found.objects[0], centre=found.objects[0].centre + np.array([0.0, 0.02, 0.0]))
     tried = SubtaskRecord(
         PUT.text,
         (gone, found.objects[1]),
