@@ -19,7 +19,7 @@ from ..types import BoolArray, GraspPose
 from .heightmap import HeightMap
 from .segments import Segment
 
-LARGE = 900
+LARGE = 2000
 """Cells of an upper surface from which on every other row and column is enough."""
 
 

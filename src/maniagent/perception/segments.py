@@ -43,12 +43,14 @@ class Segment:
     def _footprint(self) -> _Footprint:
         # The rectangle's sides are cut a little inside the extremes: one stray depth pixel mustn't stretch it.
         xy = self.points[:, :2].astype(np.float32)
-        _, (side, other), degrees = cv2.minAreaRect(xy)
-        yaw = float(np.radians(degrees)) + (np.pi / 2 if other > side else 0.0)
+        yaw = float(np.radians(cv2.minAreaRect(xy)[2]))
         axes = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])  # rows: along, across
         low, high = np.percentile(xy @ axes.T, [0.2, 99.8], axis=0)
-        length, width = high - low
-        return _Footprint((low + high) / 2 @ axes, float(length), float(width), wrap_angle(yaw, np.pi))
+        length, width = map(float, high - low)
+        centre = (low + high) / 2 @ axes
+        if width > length:
+            length, width, yaw = width, length, yaw + np.pi / 2
+        return _Footprint(centre, length, width, wrap_angle(yaw, np.pi))
 
     @cached_property
     def top_z(self) -> float:

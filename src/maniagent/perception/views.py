@@ -34,6 +34,8 @@ class Tuning:
     """m above the table plane from which a point belongs to a thing, whatever its colour."""
     chroma: float = 11.0
     """Distance in the a, b plane of CIE Lab from the table's colour that makes a thing, however flat."""
+    bleeding: float = 0.4
+    """What has less than this share of the colour next to it has it from there."""
     brighter: float = 40.0
     darker: float = 0.35
     """A thing of the table's hue is that much lighter (8-bit L), or darker than this share: a shadow is not so dark."""
@@ -132,7 +134,10 @@ def _off_colour(rgb: NDArray[np.uint8], on_plane: BoolArray, tuning: Tuning) -> 
     # In shadow a surface loses chroma along with lightness (128 is grey in 8-bit Lab).
     shade = np.minimum(lightness / max(table[0], 1.0), np.float32(1.2))[..., None]
     off_hue = lab[..., 1:] - np.float32(128) - (table[1:] - np.float32(128)) * shade
-    other_hue = np.einsum("hwc,hwc->hw", off_hue, off_hue) > tuning.chroma**2
+    strength = np.linalg.norm(off_hue, axis=-1)
+    # Lens and averaging let strong colours bleed into the pixels around them, fainter than they are.
+    bled = strength < tuning.bleeding * np.asarray(cv2.dilate(strength, np.ones((3, 3), np.uint8)))
+    other_hue = (strength > tuning.chroma) & ~bled
     differs = other_hue | (lightness > table[0] + tuning.brighter) | (lightness < table[0] * tuning.darker)
     return cv2.resize(differs.astype(np.uint8), (width, height), interpolation=cv2.INTER_NEAREST) > 0
 
