@@ -67,6 +67,8 @@ class GraspTuning:
     """Grasps kept per object."""
 
 
+STRETCH = 0.025
+"""m around a grasp over which the direction of what is grasped is measured."""
 GRIPPER = GripperShape()
 TUNING = GraspTuning()
 
@@ -82,7 +84,7 @@ def propose_grasps(
     found = _sections(centres, surface, segment, gripper, tuning)
     found = found.take(_closes(found, gripper, tuning))
     found = _with_room(found, grid, gripper, tuning)
-    return _best(found, segment, gripper, tuning)
+    return _best(found, surface, segment, gripper, tuning)
 
 
 @dataclass(frozen=True)
@@ -245,20 +247,43 @@ def _highest(found: _Candidates, v: FloatArray, half_width: float, grid: HeightM
     return grid.height[cells[..., 0], cells[..., 1]].max(axis=(1, 2), initial=0.0)
 
 
-def _scores(found: _Candidates, segment: Segment, gripper: GripperShape) -> FloatArray:
+def _squareness(found: _Candidates, surface: FloatArray) -> FloatArray:
+    """(N,) in [0, 1]: how well the fingers close across what runs through the grasp: a wall, a rim, a handle.
+
+    Cells are too coarse to tell a flank's direction within a pad's width. Over a longer stretch the principal axes of
+    what is as high as the fingertips do; the longer they are than wide, the more they count. A rim that is taken at an
+    angle turns the whole plate when the fingers close.
+    """
+    middle = surface[:, :2].mean(axis=0)
+    (x, y), at = (surface[:, :2] - middle).T, found.origin - middle
+    near = (x - at[:, :1]) ** 2 + (y - at[:, 1:]) ** 2 < STRETCH**2  # (N, M)
+    near &= surface[:, 2] > found.tip[:, None] + 0.001
+    moments = near @ np.column_stack([np.ones_like(x), x, y, x * x, x * y, y * y]).astype(np.float32)
+    mx, my, xx, xy, yy = (moments[:, 1:] / np.maximum(moments[:, :1], 1.0)).T
+    xx, xy, yy = xx - mx * mx, xy - mx * my, yy - my * my
+    # Half the difference of the principal variances, and how much of it lies along the closing axis.
+    difference = np.hypot((xx - yy) / 2, xy)
+    turned = (xx - yy) / 2 * np.cos(2 * found.yaw) + xy * np.sin(2 * found.yaw)
+    return 1.0 - (difference - turned) / np.maximum((xx + yy) / 2 + difference, 1e-9)
+
+
+def _scores(found: _Candidates, surface: FloatArray, segment: Segment, gripper: GripperShape) -> FloatArray:
     """(N,) in [0, 1]: square to the flanks, deep, near the middle (its weight turns it less), not at full stretch."""
     length = max(float(segment.extent[0]), 0.02)
     off_centre = np.linalg.norm(found.origin - segment.centre[:2], axis=1) / (length / 2)
     depth = np.clip(found.overlap / min(0.02, max(float(segment.extent[2]), 0.005)), 0.0, 1.0)
     stretch = np.clip((gripper.max_opening - found.width) / 0.012, 0.0, 1.0)
-    square = 1.0 / (1.0 + found.slope**2)  # the squared cosine of the flanks' angle
+    # The slope gives the squared cosine of the flanks' angle next to the pads.
+    square = _squareness(found, surface) / (1.0 + found.slope**2)
     return square * (0.4 + 0.6 * depth) * (1.0 - 0.7 * np.clip(off_centre, 0.0, 1.0)) * (0.8 + 0.2 * stretch)
 
 
-def _best(found: _Candidates, segment: Segment, gripper: GripperShape, tuning: GraspTuning) -> tuple[GraspPose, ...]:
+def _best(
+    found: _Candidates, surface: FloatArray, segment: Segment, gripper: GripperShape, tuning: GraspTuning
+) -> tuple[GraspPose, ...]:
     """The best candidates, none within 12 mm and 25 degrees of a better one."""
     tcp = np.column_stack([found.origin, found.tip + gripper.tip])
-    score, opening = _scores(found, segment, gripper), found.opening(gripper, tuning)
+    score, opening = _scores(found, surface, segment, gripper), found.opening(gripper, tuning)
     left = np.argsort(-score, kind="stable")
     kept: list[int] = []
     while len(left) and len(kept) < tuning.count:

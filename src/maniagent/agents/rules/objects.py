@@ -8,7 +8,7 @@ import numpy as np
 
 from ...errors import DetectionFailure, FailureStage, GraspFailure
 from ...geometry import FloatArray
-from ...perception.grasps import GRIPPER, propose_grasps
+from ...perception.grasps import GRIPPER, TUNING, GraspTuning, propose_grasps
 from ...perception.identity import find_again
 from ...perception.lexicon import Lexicon
 from ...perception.segmentation import TableView
@@ -22,6 +22,10 @@ from .commands import Action, Command
 from .controller import direction_of
 from .language import parse_instruction
 
+LEAD_WEIGHT = 20.0
+"""1/m: what a metre ahead of the object's middle is worth to a grasp that drags it, beside its score."""
+ALL_AROUND = GraspTuning(centres=120, yaws=24, count=40)
+"""For dragging, grasps are wanted on every side of an object, not only the best few."""
 UNMOVED = 0.02
 """m; what looks the same within that of its last place is the same thing."""
 
@@ -85,14 +89,15 @@ def _grasps(
     segment: Segment, view: TableView, command: Command, viewpoint: Viewpoint, attempts: Sequence[SubtaskRecord]
 ) -> tuple[GraspPose, ...]:
     """The object's grasps, best first; each attempt that failed to hold it moves on to the next."""
-    grasps = propose_grasps(segment, view.height_map)
+    drags = command.action in (Action.DRAG, Action.PUSH)
+    grasps = propose_grasps(segment, view.height_map, tuning=ALL_AROUND if drags else TUNING)
     if not grasps:
         width = segment.extent[1]
         why = f"it is {width * 100:.1f} cm wide, the gripper opens {GRIPPER.max_opening * 100:.1f} cm"
         if width + 0.006 < GRIPPER.max_opening:
             why = "it lies too flat, or other things are in the way"
         raise GraspFailure(f"No grasp was found for the {command.object}: {why}.")
-    if command.action in (Action.DRAG, Action.PUSH):
+    if drags:
         grasps = _leading_first(grasps, segment, direction_of(command, segment.centre[:2], viewpoint))
     spoiled = (FailureStage.GRASP, FailureStage.CONTROL)
     tried = sum(record.outcome.stage in spoiled for record in attempts) % len(grasps)
@@ -100,13 +105,15 @@ def _grasps(
 
 
 def _leading_first(grasps: tuple[GraspPose, ...], segment: Segment, direction: FloatArray) -> tuple[GraspPose, ...]:
-    """Grasps on the side towards which it is dragged come first: what is pulled trails, what is pushed turns."""
+    """Grasps straight ahead of the middle come first: what is pulled swings round until its middle trails the fingers.
+
+    How far ahead counts in metres, so that it matters for a plate and hardly for a block.
+    """
 
     def lead(grasp: GraspPose) -> float:
-        offset = grasp.T_base_grasp[:2, 3] - segment.centre[:2]
-        return float(offset @ direction) / max(float(np.linalg.norm(offset)), 1e-3)
+        return float((grasp.T_base_grasp[:2, 3] - segment.centre[:2]) @ direction)
 
-    return tuple(sorted(grasps, key=lambda grasp: -(grasp.score + 0.5 * lead(grasp))))
+    return tuple(sorted(grasps, key=lambda grasp: -(grasp.score + LEAD_WEIGHT * lead(grasp))))
 
 
 def _detection(segment: Segment, query: str, score: float, observation: Observation) -> Detection:
