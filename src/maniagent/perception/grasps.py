@@ -273,8 +273,10 @@ def _scores(found: _Candidates, surface: FloatArray, segment: Segment, gripper: 
     off_centre = np.linalg.norm(found.origin - segment.centre[:2], axis=1) / (length / 2)
     depth = np.clip(found.overlap / min(0.02, max(float(segment.extent[2]), 0.005)), 0.0, 1.0)
     stretch = np.clip((gripper.max_opening - found.width) / 0.012, 0.0, 1.0)
-    # The slope gives the squared cosine of the flanks' angle next to the pads.
-    square = _squareness(found, surface) / (1.0 + found.slope**2)
+    # The slope gives the squared cosine of the flanks' angle next to the pads. The two flanks of a block's corner rise
+    # and fall alike, so that corners look square, too; but there the block is wider than across its sides.
+    narrow = np.clip(float(segment.extent[1]) / np.maximum(found.width, 1e-3), 0.0, 1.0)
+    square = _squareness(found, surface) * narrow**2 / (1.0 + found.slope**2)
     return square * (0.4 + 0.6 * depth) * (1.0 - 0.7 * np.clip(off_centre, 0.0, 1.0)) * (0.8 + 0.2 * stretch)
 
 
