@@ -298,7 +298,9 @@ def test_ctrl_c_stops_the_arm_where_it_is_and_leaves_a_folder_that_can_be_read(
     positions, velocities, home = Twin.latest.arm
     assert np.abs(velocities).max() < 0.1, "the arm is at rest"
     assert np.abs(positions - home).max() > 0.1, "it was on its way"
-    assert read_lines(tmp_path / "run" / "events.jsonl")[-1]["kind"] == "move"
+    assert [line["kind"] for line in read_lines(tmp_path / "run" / "events.jsonl")[-2:]] == ["move", "run_finished"]
+    summary = json.loads((tmp_path / "run" / "summary.json").read_text(encoding="utf-8"))
+    assert (summary["verdict"], summary["achieved"]) == ("aborted", None)
     assert (tmp_path / "run" / "report.html").exists()
 
 
