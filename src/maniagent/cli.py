@@ -229,12 +229,12 @@ def _tell_outcome(outcome: RunOutcome, as_json: bool) -> None:
 def _tell_evaluation(summary: Summary, as_json: bool) -> None:
     from .console.output import print_json, print_table
     from .evaluation.runner import REPORT
-    from .evaluation.tables import published_table, result_table, stage_table
+    from .evaluation.tables import outcome_table, published_table, stage_table
 
     if as_json:
         print_json(summary.to_plain())
         return
-    tables = [result_table(summary), stage_table(summary), published_table(summary).columns(3)]
+    tables = [outcome_table(summary), stage_table(summary), published_table(summary).columns(3)]
     for table in tables:
         if table.rows:
             print_table(table.head, table.rows)

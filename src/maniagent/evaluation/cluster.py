@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Generator, Sequence
 from typing import Any
 
-from ..errors import SetupError
+from ..errors import ManiAgentError, SetupError
 from .episode import CRASH, EpisodeResult, Job, lost
 from .play import Play
 from .workers import LocalExecutor
@@ -55,7 +55,9 @@ class RayExecutor:
         try:
             result: EpisodeResult = self._ray.get(reference)
         except self._ray.exceptions.RayTaskError as error:
-            raise error.cause from None
+            if isinstance(error.cause, ManiAgentError):
+                raise error.cause from None
+            raise SetupError(f"A node can't play episodes (is the same maniagent installed there?): {error}") from error
         except self._ray.exceptions.RayError as error:
             return lost(job, CRASH, f"Ray lost the episode: {type(error).__name__}: {error}")
         return result

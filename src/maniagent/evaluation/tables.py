@@ -25,26 +25,44 @@ class Table:
         return Table(self.head[:count], tuple(row[:count] for row in self.rows))
 
 
+Columns = dict[str, Callable[[Row], str]]
+
+
+def outcome_table(summary: Summary) -> Table:
+    """How often each task succeeds, and the average."""
+    return _by_row(summary, _outcome_columns(summary))
+
+
 def result_table(summary: Summary) -> Table:
-    """A row for each task, and the average; columns that nobody filled are left out."""
-    rows = summary.everything
-    criteria = dict.fromkeys(name for row in rows for name in row.criteria)
-    columns: dict[str, Callable[[Row], str]] = {
+    """The same, and what it took. Columns that nobody filled are left out."""
+    return _by_row(summary, {**_outcome_columns(summary), **_EFFORT})
+
+
+def _outcome_columns(summary: Summary) -> Columns:
+    criteria = dict.fromkeys(name for row in summary.rows for name in row.criteria)
+    return {
         "task": lambda row: row.task,
         "episodes": lambda row: str(row.success.episodes),
-        "success": lambda row: percent(row.success.value),
+        "success %": lambda row: _rate(row.success),
         "95 % interval": lambda row: interval(row.success),
-        **{name: _by_criterion(name) for name in criteria},
-        "verdict right": lambda row: _rate(row.agreement),
-        "turns": lambda row: _number(row.turns),
-        "steps": lambda row: _number(row.steps),
-        "robot s": lambda row: _number(row.robot_seconds),
-        "model calls": lambda row: f"{row.model_calls or ''}",
-        "tokens": lambda row: f"{row.tokens or ''}",
-        "wall s": lambda row: _number(row.wall_seconds_median),
-        "longest": lambda row: _number(row.wall_seconds_max),
+        **{f"{name} %": _by_criterion(name) for name in criteria},
+        "verdict right %": lambda row: _rate(row.agreement),
     }
-    cells = {name: [text(row) for row in rows] for name, text in columns.items()}
+
+
+_EFFORT: Columns = {
+    "turns": lambda row: _number(row.turns),
+    "steps": lambda row: _number(row.steps),
+    "robot s": lambda row: _number(row.robot_seconds),
+    "model calls": lambda row: f"{row.model_calls or ''}",
+    "tokens": lambda row: f"{row.tokens or ''}",
+    "wall s": lambda row: _number(row.wall_seconds_median),
+    "longest s": lambda row: _number(row.wall_seconds_max),
+}
+
+
+def _by_row(summary: Summary, columns: Columns) -> Table:
+    cells = {name: [text(row) for row in summary.everything] for name, text in columns.items()}
     filled = {name: texts for name, texts in cells.items() if any(texts)}
     return Table(tuple(filled), tuple(zip(*filled.values(), strict=True)))
 
@@ -114,7 +132,7 @@ def percent(share: float) -> str:
 
 def interval(rate: Rate) -> str:
     """The interval of a rate, in percent."""
-    return f"{100 * rate.low:.1f} – {100 * rate.high:.1f}"
+    return f"{100 * rate.low:.1f}–{100 * rate.high:.1f}"
 
 
 def _by_criterion(name: str) -> Callable[[Row], str]:
@@ -122,7 +140,7 @@ def _by_criterion(name: str) -> Callable[[Row], str]:
 
 
 def _rate(rate: Rate | None) -> str:
-    return percent(rate.value) if rate is not None else ""
+    return "" if rate is None else f"{100 * rate.value:.1f}"
 
 
 def _number(value: float | None) -> str:
