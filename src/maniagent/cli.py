@@ -117,8 +117,8 @@ def evaluate(
 ) -> None:
     """Play the tasks of a suite many times and say how often they succeed, with 95 % intervals.
 
-    Killed half-way, the same command goes on where it was. DIR holds results.jsonl, summary.json, summary.md,
-    episodes.csv, report.html, and a run folder for each episode.
+    Killed half-way, the same command goes on where it was. The folder holds results.jsonl, summary.json, summary.md,
+    episodes.csv, report.html, workers.log, and a run folder for each episode.
 
     [bold]Examples[/]
 

@@ -31,8 +31,9 @@ def run_episode(task: str, seed: int, episode: int, actor: str, out: Path | None
             reason="I see <b>it</b> | there", failed_turns={"grasp": 2}, turns=3, criteria={"strict": False},
         )  # fmt: skip
     return EpisodeResult(
-        task=task, seed=seed, episode=episode, success=True, believed=True, turns=2, criteria={"strict": episode > 0}
-    )
+        task=task, seed=seed, episode=episode, success=True, believed=True, turns=2, criteria={"strict": episode > 0},
+        reason=f"process {os.getpid()}" if task == "who" else "",
+    )  # fmt: skip
 
 
 def repeat(job: Job, actor: str) -> str:

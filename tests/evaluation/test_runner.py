@@ -50,6 +50,9 @@ def test_whatever_happens_to_an_episode_it_alone_fails_and_says_why(tmp_path: Pa
         "hang": ("time-limit", "Stopped because it took longer than 2 s."),
     }
     assert [row.task for row in summary.rows if row.success.value == 1] == ["win", "chatter"]
+    log = (tmp_path / "workers.log").read_text()
+    assert "a library talks" in log
+    assert "Traceback" in log
     assert summary.failed[0].repeat == "play lose-s0-e000 --with rules"
 
 
@@ -65,6 +68,15 @@ def test_what_is_finished_is_not_played_again(tmp_path: Path) -> None:
     assert second.finished == 4
     assert [row.success for row in second.rows] == [row.success for row in first.rows]
     assert (tmp_path / RESULTS).read_bytes().startswith(b"".join(lines[:3]))
+
+
+@pytest.mark.slow
+def test_a_worker_is_replaced_before_it_grows_too_big(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setattr("maniagent.evaluation.workers._EPISODES_PER_PROCESS", 2)
+    summary = play(tmp_path, "who", episodes=6)
+    assert summary.finished == 6
+    told = [json.loads(line)["reason"] for line in (tmp_path / RESULTS).read_bytes().splitlines()]
+    assert all(told.count(process) <= 2 for process in told)
 
 
 @pytest.mark.slow

@@ -27,6 +27,7 @@ class RayExecutor:
         """
         self._play, self._workers, self._time_limit = play, workers, time_limit
         self._ray = _import_ray()
+        self._connected = not self._ray.is_initialized()  # else the caller's connection is used, and left alone
         try:
             self._ray.init(address=address, log_to_driver=False, logging_level="error", ignore_reinit_error=True)
         except (ConnectionError, ValueError, RuntimeError) as error:
@@ -48,7 +49,8 @@ class RayExecutor:
         finally:
             for reference in running:
                 ray.cancel(reference, force=True)
-            ray.shutdown()
+            if self._connected:
+                ray.shutdown()
 
     def _result(self, reference: Any, job: Job) -> EpisodeResult:
         """What came of a job; raises on what the episode raised on purpose."""

@@ -21,6 +21,8 @@ from .summary import Summary, summarise
 from .workers import LocalExecutor
 
 SUMMARY, EPISODES_CSV, MARKDOWN, REPORT = "summary.json", "episodes.csv", "summary.md", "report.html"
+WORKERS_LOG = "workers.log"
+"""What worker processes print, with the tracebacks of crashes."""
 
 
 class Watcher(Protocol):
@@ -85,7 +87,9 @@ def evaluate(
         try:
             if pending := [job for job in jobs if job not in finished]:
                 play = Play(chosen, actor, folder if record else None)
-                _play(_executor(play, workers, time_limit, ray), pending, results, watcher)
+                local: Executor = LocalExecutor(play, workers, time_limit, folder / WORKERS_LOG)
+                executor = local if ray is None else RayExecutor(play, workers, time_limit, ray)
+                _play(executor, pending, results, watcher)
         finally:
             summary = summarise(chosen, settings, Path(out), results.done, len(jobs), figures)
             _write(folder, summary, results.done)
@@ -100,10 +104,6 @@ def _check(episodes: int, seeds: int, workers: int, time_limit: float) -> None:
         raise UsageError(f"The number of episodes is {episodes}; it should be {MOST_EPISODES} or less. Use more seeds.")
     if not time_limit > 0:
         raise UsageError(f"The time limit is {time_limit} s; it should be more than 0.")
-
-
-def _executor(play: Play, workers: int, time_limit: float, ray: str | None) -> Executor:
-    return LocalExecutor(play, workers, time_limit) if ray is None else RayExecutor(play, workers, time_limit, ray)
 
 
 def _play(executor: Executor, jobs: Sequence[Job], results: ResultsFile, watcher: Watcher | None) -> None:

@@ -8,9 +8,11 @@ import os
 import signal
 import threading
 import time
+import traceback
 from collections import deque
 from collections.abc import Generator, Iterator, Sequence
 from multiprocessing.connection import Connection, wait
+from pathlib import Path
 
 from ..errors import SetupError, UsageError
 from .episode import CRASH, TIME_LIMIT, EpisodeResult, Job, lost
@@ -19,16 +21,20 @@ from .play import Play
 _START_LIMIT = 180.0
 """Seconds that a worker may take to start, imports included."""
 
+_EPISODES_PER_PROCESS = 25
+"""After so many a worker is replaced: simulators and renderers keep some megabytes of every episode."""
+
 
 class LocalExecutor:
     """Plays jobs in `workers` processes of this machine, each episode for `time_limit` seconds at most.
 
     The processes are spawned, as rendering contexts and threads don't survive a fork: a script that gets here keeps
-    its own doings under `if __name__ == "__main__":`.
+    its own doings under `if __name__ == "__main__":`. What they and their libraries print goes to the end of `log`, as
+    do the tracebacks of crashes; without it, to stderr.
     """
 
-    def __init__(self, play: Play, workers: int, time_limit: float) -> None:
-        self._play, self._workers, self._time_limit = play, workers, time_limit
+    def __init__(self, play: Play, workers: int, time_limit: float, log: Path | None = None) -> None:
+        self._play, self._workers, self._time_limit, self._log = play, workers, time_limit, log
 
     def run(self, jobs: Sequence[Job]) -> Generator[EpisodeResult, None, None]:
         """See Executor."""
@@ -38,7 +44,7 @@ class LocalExecutor:
             while waiting or any(worker.job for worker in crew):
                 crew = [worker for worker in crew if worker.alive]
                 while len(crew) < min(self._workers, len(waiting) + sum(worker.job is not None for worker in crew)):
-                    crew.append(_Worker(self._play))
+                    crew.append(_Worker(self._play, self._log))
                 for worker in crew:
                     if waiting and worker.idle:
                         worker.start(waiting.popleft(), self._time_limit)
@@ -61,14 +67,15 @@ def _finished(crew: Sequence[_Worker]) -> Iterator[EpisodeResult]:
 class _Worker:
     """One process, seen from the parent."""
 
-    def __init__(self, play: Play) -> None:
+    def __init__(self, play: Play, log: Path | None) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
-        self._process = context.Process(target=_serve, args=(theirs, play), daemon=True)
+        self._process = context.Process(target=_serve, args=(theirs, play, log), daemon=True)
         self._process.start()
         theirs.close()  # so that its death shows as the end of the connection
         self.alive, self._ready = True, False
         self.job: Job | None = None
+        self._played = 0
         self._began = time.monotonic()
         self._limit = _START_LIMIT
 
@@ -101,9 +108,12 @@ class _Worker:
             self._ready = True
             return None
         self.job = None
-        if isinstance(answer, EpisodeResult):
-            return answer
-        raise answer
+        if not isinstance(answer, EpisodeResult):
+            raise answer
+        self._played += 1
+        if self._played >= _EPISODES_PER_PROCESS:
+            self.kill()
+        return answer
 
     def check_time(self) -> EpisodeResult | None:
         """End the process where it is late; the result of the job that this costs."""
@@ -140,10 +150,10 @@ class _Worker:
         return lost(job, stage, reason, round(time.monotonic() - self._began, 2))
 
 
-def _serve(connection: Connection[object, Job], play: Play) -> None:
+def _serve(connection: Connection[object, Job], play: Play, log: Path | None) -> None:
     """What a worker process does: play one job after another until the connection ends."""
     signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
-    os.dup2(2, 1)  # stdout is the parent's, too: a library's chatter must not get between its lines
+    _redirect_output(log)
     threading.Thread(target=_die_with_parent, daemon=True).start()
     connection.send(None)
     while True:
@@ -163,7 +173,15 @@ def _answer(play: Play, job: Job) -> EpisodeResult | UsageError | SetupError:
     except SetupError as error:
         return SetupError(str(error))
     except Exception as error:  # noqa: BLE001 - the edge of the process: one crash must not end the evaluation
+        traceback.print_exc()
         return lost(job, CRASH, f"{type(error).__name__}: {error}", round(time.monotonic() - start, 2))
+
+
+def _redirect_output(log: Path | None) -> None:
+    """Keep what libraries print, also from C, out of the parent's lines on stdout and its display on stderr."""
+    if log is not None:
+        os.dup2(os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644), 2)
+    os.dup2(2, 1)
 
 
 def _die_with_parent() -> None:
