@@ -12,10 +12,12 @@ from numpy.typing import NDArray
 
 from .agents.events import EventLog, Observer
 from .agents.loop import AgentLoop
+from .agents.protocols import Agents
 from .agents.rules import rules_agents
 from .console.recorder import Recorder
 from .envs.tabletop import TabletopEnv
 from .errors import UsageError
+from .perception.views import RobotFilter
 from .robots.robot import Robot
 from .robots.simulated import SimulatedRobot
 from .tasks import Task, get, load_task
@@ -47,8 +49,9 @@ def run(
     out: str | Path | None = None,
     view: bool = False,
     observers: Sequence[Observer] = (),
+    agents: Callable[[RobotFilter], Agents] = rules_agents,
 ) -> RunOutcome:
-    """Carry out an instruction in the tabletop twin with the `rules` agents.
+    """Carry out an instruction in the tabletop twin, with the `rules` agents where `agents` makes no others.
 
     Give a task by name, or a scene file (docs/scenes.md). Without an instruction the task's own is carried out.
     `seed` draws the layout and the sensors' noise: the same seed gives the same run. With `out` the run leaves a
@@ -83,7 +86,7 @@ def run(
             env.settle(REST_SECONDS)
             return episode.achieved(env.truth())
 
-        result, achieved = _carry_out(robot, said, name, seed, log, achieved_now)
+        result, achieved = _carry_out(robot, agents(robot.covers), said, name, seed, log, achieved_now)
     return RunOutcome(name, seed, said, result, achieved, folder)
 
 
@@ -98,10 +101,15 @@ def _film(log: EventLog) -> Callable[[NDArray[np.uint8], float], None]:
 
 
 def _carry_out(
-    robot: Robot, instruction: str, task: str | None, seed: int, log: EventLog, achieved_now: Callable[[], bool | None]
+    robot: Robot,
+    agents: Agents,
+    instruction: str,
+    task: str | None,
+    seed: int,
+    log: EventLog,
+    achieved_now: Callable[[], bool | None],
 ) -> tuple[RunResult, bool | None]:
     """Run the loop; what is true is asked only when the agents are through."""
-    agents = rules_agents(robot.covers)
     log.emit("run_started", instruction=instruction, task=task, seed=seed, agents=agents.name)
     try:
         result = AgentLoop(robot, agents, log).run(instruction)
