@@ -17,10 +17,16 @@ from maniagent.cli import app
 QUICK = ("eval", "drag-plate", "--seeds", "1", "--no-record", "--json")
 
 
+def hear_ctrl_c() -> None:
+    """Undo what a shell does to what it starts in the background (tests may run there): it has it ignore Ctrl-C."""
+    signal.signal(signal.SIGINT, signal.SIG_DFL)
+
+
 def start(out: Path, *options: str) -> subprocess.Popen[str]:
     command = [sys.executable, "-m", "maniagent.cli", *QUICK, "--out", str(out), *options]
+    pipe = subprocess.PIPE
     return subprocess.Popen(
-        command, stdout=subprocess.PIPE, stderr=subprocess.PIPE, text=True, start_new_session=True
+        command, stdout=pipe, stderr=pipe, text=True, start_new_session=True, preexec_fn=hear_ctrl_c
     )  # fmt: skip
 
 
