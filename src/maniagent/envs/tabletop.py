@@ -174,12 +174,12 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
 
     def close(self) -> None:
         """Free the renderer and the viewer; closing twice does no harm."""
-        if self._renderer is not None:
-            self._renderer.close()
-            self._renderer = None
         if self._view is not None:
             self._view.close()
             self._view = None
+        if self._renderer is not None:
+            self._renderer.close()
+            self._renderer = None
 
     def _gym_observation(self) -> dict[str, Any]:
         observation = self.observe()

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 import os
 import sys
+import threading
 import time
 
 import mujoco
@@ -27,7 +28,9 @@ class LiveView:
         from mujoco import viewer  # it needs a GL library with windows, which nothing else here does
 
         self._data = data
+        others = set(threading.enumerate())
         self._viewer = viewer.launch_passive(model, data, show_left_ui=False, show_right_ui=False)
+        self._threads = set(threading.enumerate()) - others
         self._start = time.monotonic() - data.time
 
     def show(self) -> None:
@@ -42,5 +45,7 @@ class LiveView:
             self._start = time.monotonic() - self._data.time  # after a pause for thought, not in fast motion
 
     def close(self) -> None:
-        """Close the window."""
+        """Close the window, and wait until the viewer's thread lets go of model and data."""
         self._viewer.close()
+        for thread in self._threads:
+            thread.join(timeout=5.0)
