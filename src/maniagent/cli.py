@@ -80,6 +80,9 @@ def run(
 
       maniagent run --task green-on-yellow --json | jq .achieved
 
+    What is achieved is judged by the task's own check, whatever was said; for an instruction that asks for something
+    else, use a scene file.
+
     Exit status: 0 achieved, 1 not achieved, 2 wrong use or missing set-up, 130 stopped with Ctrl-C.
     """
     with _errors_told(as_json):

@@ -1,7 +1,6 @@
 """The page, the tables and the files of an evaluation say what happened, whatever words it comes in."""
 
 import csv
-import html.parser
 import json
 from pathlib import Path
 
@@ -15,39 +14,9 @@ from maniagent.evaluation.episode import EpisodeResult, Job, lost
 from maniagent.evaluation.published import published
 from maniagent.evaluation.results import Settings
 from maniagent.evaluation.summary import Summary, summarise
+from pages import Reader
 
 HOSTILE = '</title><script>alert(1)</script><img src=x onerror="alert(2)">\x00 | `a` " \' & {braces}'
-VOID = {"meta", "img"}
-
-
-class Reader(html.parser.HTMLParser):
-    """Checks that every element is closed in order; collects what is worth asking about."""
-
-    def __init__(self, source: str) -> None:
-        super().__init__()
-        self.open: list[str] = []
-        self.elements: list[tuple[str, dict[str, str | None]]] = []
-        self.words: list[str] = []
-        self.feed(source)
-        assert not self.open
-
-    def handle_starttag(self, tag: str, attrs: list[tuple[str, str | None]]) -> None:
-        self.elements.append((tag, dict(attrs)))
-        if tag not in VOID:
-            self.open.append(tag)
-
-    def handle_endtag(self, tag: str) -> None:
-        assert self.open.pop() == tag
-
-    def handle_data(self, data: str) -> None:
-        self.words.append(data)
-
-    def all(self, tag: str) -> list[dict[str, str | None]]:
-        return [attributes for name, attributes in self.elements if name == tag]
-
-    @property
-    def text(self) -> str:
-        return " ".join(" ".join(self.words).split())
 
 
 def run_folder(out: Path, job: Job) -> str:

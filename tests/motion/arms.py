@@ -7,10 +7,9 @@ from collections.abc import Callable, Sequence
 import mujoco
 import numpy as np
 
-from maniagent.assets import WX250S_XML
+from maniagent.assets import JOINTS, WX250S_XML
 from maniagent.geometry import FloatArray, make_transform, top_down_rotation
 from maniagent.motion import ArmModel, ArmState
-from maniagent.motion.kinematics import JOINTS
 from maniagent.types import OrientedBox
 
 LAG = 0.06

@@ -6,10 +6,8 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
+from .objects.bodies import COLLISION_GROUP
 from .rendering import ensure_gl
-
-COLLISION_GROUP = 3
-"""Geom group of collision shapes, which cameras don't see (visual shapes are in group 1)."""
 
 
 class OffscreenRenderer:

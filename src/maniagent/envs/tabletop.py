@@ -15,7 +15,7 @@ import mujoco
 import numpy as np
 from numpy.typing import NDArray
 
-from ..assets import WX250S_XML
+from ..assets import JOINTS, WX250S_XML
 from ..errors import UsageError
 from ..geometry import FloatArray, make_transform
 from ..types import CameraFrame, Observation, RobotState
@@ -26,7 +26,6 @@ from .scene import Placement, Scene, place_objects
 from .studio import add_studio
 from .viewer import LiveView, require_screen
 
-JOINTS = ("waist", "shoulder", "elbow", "forearm_roll", "wrist_angle", "wrist_rotate")
 TIMESTEP = 0.002
 PAD_INSET = 0.013
 """m: the finger pads are 2 (q - PAD_INSET) apart at finger joint position q."""

@@ -8,10 +8,11 @@ from dataclasses import dataclass
 import mujoco
 import numpy as np
 
+from ..assets import JOINTS
 from ..errors import MotionRejected
 from ..geometry import FloatArray, make_transform, rotation_z
 from ..types import OrientedBox
-from .kinematics import FINGERS, JOINTS, ArmModel
+from .kinematics import FINGERS, ArmModel
 
 MAX_OBSTACLES = 32
 TABLE_SLACK = 0.003

@@ -7,10 +7,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+from ..assets import JOINTS
 from ..errors import MotionRejected, UsageError
 from ..geometry import FloatArray
 from ..types import KeyPoint
-from .kinematics import JOINTS, ArmModel
+from .kinematics import ArmModel
 from .limits import MotionLimits
 from .plan import MotionPlan
 from .trajectory import JointTrajectory

@@ -10,10 +10,11 @@ from __future__ import annotations
 import mink
 import numpy as np
 
+from ..assets import JOINTS
 from ..errors import MotionRejected
 from ..geometry import FloatArray, rotation_angle
 from .closed_form import ArmDimensions, postures
-from .kinematics import JOINTS, ArmModel
+from .kinematics import ArmModel
 
 POSITION_TOLERANCE = 2e-4
 """m; a fifth of what is promised."""

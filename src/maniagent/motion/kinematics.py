@@ -7,13 +7,10 @@ from pathlib import Path
 import mujoco
 import numpy as np
 
-from ..assets import WX250S_XML
+from ..assets import JOINTS, WX250S_XML
 from ..geometry import FloatArray, make_transform
 from ..types import BoolArray
 from .body import ArmBody
-
-JOINTS = ("waist", "shoulder", "elbow", "forearm_roll", "wrist_angle", "wrist_rotate")
-"""The arm's joints in the order of every (6,) joint vector."""
 
 FINGERS = ("left_finger", "right_finger")
 

@@ -6,9 +6,10 @@ from dataclasses import dataclass
 
 import numpy as np
 
+from ..assets import JOINTS
 from ..geometry import FloatArray
 from .arm import ArmState
-from .kinematics import JOINTS, ArmModel
+from .kinematics import ArmModel
 
 
 @dataclass(frozen=True)

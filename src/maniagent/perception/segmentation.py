@@ -42,7 +42,7 @@ class TableView:
     """Everything perception knows of one observation."""
 
     segments: tuple[Segment, ...]
-    """Left to right, then far to near, as numbered in pictures."""
+    """In the order of base y, lowest first: in the twin, left to right in the main view."""
     height_map: HeightMap
 
 
