@@ -110,7 +110,7 @@ def env() -> Iterator[TabletopEnv]:
 def test_the_true_state_is_out_of_the_agents_reach_in_a_real_run(env: TabletopEnv) -> None:
     handed: list[object] = []
     robot = SimulatedRobot(env)
-    plain = rules_agents(robot.covers)
+    plain = rules_agents(robot.rig)
     roles = (plain.scene, plain.reasoning, plain.objects, plain.controller)
     agents = Agents(plain.name, *(Recorded(role, handed) for role in roles))
     result = AgentLoop(robot, agents, EventLog(), Budget(turns=2)).run("put the pepper on the plate")
@@ -219,7 +219,7 @@ def test_decisions_are_the_same_when_the_truth_changes_behind_the_picture(task: 
         env = TabletopEnv(tasks.get(task).scene)
         env.reset(seed=1)
         robot, decisions = Scrambling(env, scramble), Decisions()
-        loop = AgentLoop(robot, rules_agents(robot.covers), EventLog([decisions]), Budget(turns=1))
+        loop = AgentLoop(robot, rules_agents(robot.rig), EventLog([decisions]), Budget(turns=1))
         loop.run(tasks.get(task).instruction)
         env.close()
         said.append(decisions.said)

@@ -17,7 +17,7 @@ from .agents.rules import rules_agents
 from .console.recorder import Recorder
 from .envs.tabletop import TabletopEnv
 from .errors import UsageError
-from .perception.views import RobotFilter
+from .perception.rig import Rig
 from .robots.robot import Robot
 from .robots.simulated import SimulatedRobot
 from .tasks import Task, get, load_task
@@ -49,7 +49,7 @@ def run(
     out: str | Path | None = None,
     view: bool = False,
     observers: Sequence[Observer] = (),
-    agents: Callable[[RobotFilter], Agents] = rules_agents,
+    agents: Callable[[Rig], Agents] = rules_agents,
 ) -> RunOutcome:
     """Carry out an instruction in the tabletop twin, with the `rules` agents where `agents` makes no others.
 
@@ -86,7 +86,7 @@ def run(
             env.settle(REST_SECONDS)
             return episode.achieved(env.truth())
 
-        result, achieved = _carry_out(robot, agents(robot.covers), said, name, seed, log, achieved_now)
+        result, achieved = _carry_out(robot, agents(robot.rig), said, name, seed, log, achieved_now)
     return RunOutcome(name, seed, said, result, achieved, folder)
 
 

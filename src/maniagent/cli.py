@@ -2,8 +2,6 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
-from contextlib import contextmanager
 from dataclasses import asdict
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
@@ -11,14 +9,11 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from . import __version__
-from .errors import ManiAgentError
+from .commands.common import ACHIEVED, NOT_ACHIEVED, WRONG_USE, Json, errors_told
 
 if TYPE_CHECKING:
     from .app import RunOutcome
     from .evaluation.summary import Summary
-
-ACHIEVED, NOT_ACHIEVED, WRONG_USE, INTERRUPTED = 0, 1, 2, 130
-"""Exit statuses."""
 
 app = typer.Typer(
     name="maniagent",
@@ -29,8 +24,6 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="Start with [bold]maniagent doctor[/], then [bold]maniagent run --task carrot-on-plate[/].",
 )
-
-Json = Annotated[bool, typer.Option("--json", help="Print one JSON value on stdout and nothing else.")]
 
 
 def main() -> None:
@@ -85,7 +78,7 @@ def run(
 
     Exit status: 0 achieved, 1 not achieved, 2 wrong use or missing set-up, 130 stopped with Ctrl-C.
     """
-    with _errors_told(as_json):
+    with errors_told(as_json):
         from .app import run as run_app
         from .console.folder import default_folder
         from .console.progress import Progress
@@ -131,7 +124,7 @@ def evaluate(
 
     Exit status: 0 when it ran to its end, whatever the success; 2 wrong use or missing set-up; 130 Ctrl-C.
     """
-    with _errors_told(as_json):
+    with errors_told(as_json):
         from .evaluation.progress import EvaluationProgress
         from .evaluation.runner import evaluate as run_evaluation
 
@@ -147,7 +140,7 @@ def evaluate(
 @app.command()
 def tasks(as_json: Json = False) -> None:
     """List the tasks: name, suite, what is said to the robot, and whether a language model is needed for it."""
-    with _errors_told(as_json):
+    with errors_told(as_json):
         from .console.output import print_json, print_table
         from .tasks import get, names
 
@@ -165,7 +158,7 @@ def gallery(
     out: Annotated[Path, typer.Option(help="The PNG file to write.")] = Path("gallery.png"), as_json: Json = False
 ) -> None:
     """Draw every object of the library into one picture."""
-    with _errors_told(as_json):
+    with errors_told(as_json):
         from .envs.gallery import render_gallery
 
         _tell_path(render_gallery(out), as_json)
@@ -174,7 +167,7 @@ def gallery(
 @app.command()
 def report(folder: Annotated[Path, typer.Argument(help="A run folder.")], as_json: Json = False) -> None:
     """Write a run folder's report.html anew, also for a run that was cut short."""
-    with _errors_told(as_json):
+    with errors_told(as_json):
         from .console.report import write_report
 
         _tell_path(write_report(folder), as_json)
@@ -186,7 +179,7 @@ def doctor(as_json: Json = False) -> None:
 
     Exit status: 0 where `maniagent run` works here, else 2.
     """
-    with _errors_told(as_json):
+    with errors_told(as_json):
         from .console.output import print_checks, print_json
         from .doctor import examine, works
 
@@ -196,25 +189,6 @@ def doctor(as_json: Json = False) -> None:
         else:
             print_checks(checks)
         raise typer.Exit(ACHIEVED if works(checks) else WRONG_USE)
-
-
-@contextmanager
-def _errors_told(as_json: bool) -> Iterator[None]:
-    """Turn what ends a command early into one line, one JSON object where that was asked for, and an exit status."""
-    from .console.output import print_error, print_json
-
-    try:
-        yield
-    except ManiAgentError as error:
-        message, status = str(error), WRONG_USE
-    except KeyboardInterrupt:
-        message, status = "Stopped with Ctrl-C.", INTERRUPTED
-    else:
-        return
-    print_error(message)
-    if as_json:
-        print_json({"error": message})
-    raise typer.Exit(status)
 
 
 def _tell_outcome(outcome: RunOutcome, as_json: bool) -> None:

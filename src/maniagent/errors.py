@@ -45,6 +45,7 @@ class FailureStage(StrEnum):
     PLANNING = "planning"
     CONTROL = "control"
     FORMAT = "format"
+    MODEL = "model"
 
 
 class StageFailure(ManiAgentError):
@@ -87,6 +88,12 @@ class MotionRejected(StageFailure):
     """A motion was refused before it began: out of the workspace, unreachable, in collision or too fast."""
 
     stage = FailureStage.PLANNING
+
+
+class ModelFailure(StageFailure):
+    """A chat model can't be reached, refuses, or its budget is used up; asking again at once is of no use."""
+
+    stage = FailureStage.MODEL
 
 
 class FormatFailure(StageFailure):

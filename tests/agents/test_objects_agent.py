@@ -15,6 +15,7 @@ from maniagent.envs.tabletop import TabletopEnv, TrueObject
 from maniagent.errors import DetectionFailure, FailureStage, GraspFailure
 from maniagent.motion import ArmModel
 from maniagent.perception.lexicon import Lexicon
+from maniagent.perception.rig import Rig
 from maniagent.perception.sight import Sight
 from maniagent.robots.simulated import BodyFilter
 from maniagent.types import ExecutionReport, ObjectInfo, Observation, Subtask, SubtaskRecord, Verdict
@@ -37,7 +38,7 @@ def table(task: str) -> Table:
 
 @pytest.fixture(scope="module")
 def agent() -> RulesObjectAgent:
-    return RulesObjectAgent(Sight(BodyFilter(ArmModel())), Lexicon.load())
+    return RulesObjectAgent(Sight(Rig(BodyFilter(ArmModel()))), Lexicon.load())
 
 
 def subtask(text: str, *queries: str) -> Subtask:

@@ -14,6 +14,7 @@ from maniagent.envs.scene import Placement, Scene
 from maniagent.envs.tabletop import TabletopEnv, TrueObject
 from maniagent.geometry import FloatArray, wrap_angle
 from maniagent.motion import ArmModel
+from maniagent.perception.rig import Rig
 from maniagent.perception.segmentation import TableView, segment
 from maniagent.perception.segments import Segment
 from maniagent.robots.simulated import BodyFilter
@@ -21,7 +22,7 @@ from maniagent.types import Observation
 
 BULGING = ("eggplant", "corn", "egg", "toy", "strawberry", "carrot")
 """Thick and round kinds: their far flank is hidden, and what is seen lies towards the cameras."""
-COVERS_ROBOT = BodyFilter(ArmModel())
+RIG = Rig(BodyFilter(ArmModel()))
 
 
 @dataclass(frozen=True)
@@ -54,13 +55,13 @@ def make_env(objects: Mapping[str, Any]) -> TabletopEnv:
 def look(env: TabletopEnv) -> Look:
     """See the table as it is now."""
     observation = env.observe()
-    view = segment(observation, COVERS_ROBOT)
+    view = segment(observation, RIG)
     return Look(observation, view, env.truth(), env.model, env.data.qpos.copy())
 
 
 def again(seen: Look, observation: Observation) -> Look:
     """The same table in another observation."""
-    return replace(seen, observation=observation, view=segment(observation, COVERS_ROBOT))
+    return replace(seen, observation=observation, view=segment(observation, RIG))
 
 
 def draw(objects: Mapping[str, Any], seeds: Sequence[int]) -> list[Look]:

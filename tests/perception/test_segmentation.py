@@ -10,7 +10,7 @@ import numpy as np
 import pytest
 from tables import (
     BULGING,
-    COVERS_ROBOT,
+    RIG,
     Look,
     again,
     arrange,
@@ -28,6 +28,7 @@ from maniagent.envs.objects import object_names
 from maniagent.errors import CameraFailure
 from maniagent.geometry import make_transform, top_down_rotation
 from maniagent.motion import ArmModel, IKSolver
+from maniagent.perception.rig import Rig
 from maniagent.perception.segmentation import TableView, segment
 
 ELONGATED = ("red_chili", "green_chili", "carrot", "eggplant", "banana", "corn", "knife", "fork", "spoon", "marker")
@@ -155,7 +156,7 @@ def test_neither_the_lowered_arm_nor_its_shadow_is_a_thing(lowered: Look) -> Non
 
 
 def test_without_its_kinematics_the_arm_would_be_seen(lowered: Look) -> None:
-    blind = segment(lowered.observation, lambda points, state: np.zeros(len(points), bool))
+    blind = segment(lowered.observation, Rig(lambda points, state: np.zeros(len(points), bool)))
     assert len(blind.segments) > 2
 
 
@@ -171,7 +172,7 @@ def test_one_view_is_enough(tables: list[Look]) -> None:
 
 @pytest.mark.parametrize("depth", [np.nan, 0.0, np.inf, 9.0])
 def test_a_dead_side_camera_is_left_out(tables: list[Look], depth: float) -> None:
-    found = segment(with_depth(tables[0].observation, "side", depth), COVERS_ROBOT)
+    found = segment(with_depth(tables[0].observation, "side", depth), RIG)
     assert len(found.segments) == len(tables[0].truth)
     assert all(set(s.masks) == {"main"} for s in found.segments)
 
@@ -179,7 +180,7 @@ def test_a_dead_side_camera_is_left_out(tables: list[Look], depth: float) -> Non
 @pytest.mark.parametrize("depth", [np.nan, 0.0, np.inf, 9.0])
 def test_a_dead_main_camera_is_a_camera_failure(tables: list[Look], depth: float) -> None:
     with pytest.raises(CameraFailure, match="main camera"):
-        segment(with_depth(tables[0].observation, "main", depth), COVERS_ROBOT)
+        segment(with_depth(tables[0].observation, "main", depth), RIG)
 
 
 @pytest.mark.parametrize(
@@ -200,7 +201,7 @@ def test_a_table_a_little_off_the_calibration_changes_nothing(tables: list[Look]
 
 def test_an_empty_table_has_no_segments(tables: list[Look]) -> None:
     seen = tables[0]
-    everything = segment(seen.observation, lambda points, state: np.ones(len(points), bool))
+    everything = segment(seen.observation, Rig(lambda points, state: np.ones(len(points), bool)))
     assert everything.segments == ()
 
 

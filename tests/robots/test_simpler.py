@@ -90,7 +90,7 @@ def test_the_steps_commanded_are_the_steps_counted_and_the_budget_is_kept(env: S
 def test_the_rules_stack_the_block_in_the_benchmark_within_its_steps(env: SimplerEnv) -> None:
     env.reset(3)
     robot = SimplerRobot(env, env.task.steps)
-    result = AgentLoop(robot, rules_agents(robot.covers), EventLog()).run(env.instruction)
+    result = AgentLoop(robot, rules_agents(robot.rig), EventLog()).run(env.instruction)
     robot.rest()
     assert result.verdict is RunVerdict.ACHIEVED
     assert env.info["success"]

@@ -8,7 +8,7 @@ from dataclasses import dataclass
 from ..agents.protocols import Agents
 from ..agents.rules import rules_agents
 from ..errors import UnknownNameError
-from ..perception.views import RobotFilter
+from ..perception.rig import Rig
 
 
 @dataclass(frozen=True)
@@ -16,8 +16,8 @@ class Actor:
     """Something that carries out instructions."""
 
     name: str
-    make_agents: Callable[[RobotFilter], Agents]
-    """Makes the four agents for a robot whose own body the filter tells apart in the images."""
+    make_agents: Callable[[Rig], Agents]
+    """Makes the four agents for a robot, of which they are told its rig."""
 
 
 _ACTORS = {actor.name: actor for actor in (Actor("rules", rules_agents),)}

@@ -17,8 +17,9 @@ from numpy.typing import NDArray
 from ..types import BoolArray, Observation
 from .heightmap import HeightMap, build_height_map
 from .merging import merge_regions
+from .rig import Rig
 from .segments import Segment
-from .views import RobotFilter, Tuning, ViewPoints, Workspace, foreground
+from .views import ViewPoints, foreground
 
 Labels = NDArray[np.int32]
 """(X, Y), 0 where nothing stands, else the number of a region, from 1."""
@@ -46,12 +47,7 @@ class TableView:
     height_map: HeightMap
 
 
-def segment(
-    observation: Observation,
-    covers_robot: RobotFilter,
-    workspace: Workspace = Workspace(),  # noqa: B008 - frozen
-    tuning: Tuning = Tuning(),  # noqa: B008 - frozen
-) -> TableView:
+def segment(observation: Observation, rig: Rig) -> TableView:
     """Split what the cameras see into segments, without naming them.
 
     Raises
@@ -60,8 +56,8 @@ def segment(
         Where the main view is of no use.
 
     """
-    views = foreground(observation, covers_robot, workspace, tuning)
-    grid = build_height_map(views, workspace)
+    views = foreground(observation, rig.covers_robot, rig.workspace, rig.tuning)
+    grid = build_height_map(views, rig.workspace)
     labels = merge_regions(split_regions(grid), grid)
     supports = find_supports(labels, grid)
     segments = cut_segments(views, labels, supports, grid)

@@ -5,10 +5,8 @@ from __future__ import annotations
 from collections.abc import Callable, Mapping, Sequence
 from typing import Protocol
 
-import numpy as np
-from numpy.typing import NDArray
-
-from ..types import BoolArray, ExecutionReport, KeyPoint, Observation, OrientedBox, RobotState
+from ..perception.rig import Rig
+from ..types import ExecutionReport, KeyPoint, Observation, OrientedBox
 
 Boxes = Mapping[int, OrientedBox]
 """The objects on the table by index: what a motion keeps clear of, but for those a key point may touch."""
@@ -40,8 +38,9 @@ class Robot(Protocol):
         """Stand still, now."""
         ...
 
-    def covers(self, points: NDArray[np.float32], state: RobotState) -> BoolArray:
-        """Which of the points (N, 3), base frame, lie on the robot itself, by its kinematics: (N,) bool."""
+    @property
+    def rig(self) -> Rig:
+        """What perception must be told of the robot, its table and its cameras."""
         ...
 
     def on_move(self, hook: Callable[[str, float], None]) -> None:

@@ -11,6 +11,7 @@ from ..envs.simpler import FINGER_OFFSET, PERIOD, SimplerEnv
 from ..errors import FailureStage, MotionRejected
 from ..geometry import FloatArray, make_transform
 from ..motion import ArmModel, IKSolver, MotionLimits
+from ..perception.rig import Rig
 from ..types import ExecutionReport, Gripper, KeyPoint, Observation, RobotState
 from .robot import Boxes
 from .simulated import BodyFilter
@@ -44,7 +45,7 @@ class SimplerRobot:
         self._home = state.T_base_tcp
         self._commanded = state.T_base_tcp
         self._open = True
-        self.covers = BodyFilter(self._model)
+        self.rig = Rig(BodyFilter(self._model))
 
     def state(self) -> RobotState:
         """What the encoders say."""

@@ -10,6 +10,7 @@ from numpy.typing import NDArray
 from ..envs.tabletop import TabletopEnv
 from ..geometry import FloatArray
 from ..motion import ArmModel, ArmState, MotionLimits, MotionStack
+from ..perception.rig import Rig
 from ..types import BoolArray, ExecutionReport, KeyPoint, Observation, RobotState
 from .robot import Boxes
 
@@ -79,7 +80,7 @@ class SimulatedRobot:
         self._next_frame = 0.0
         self._move_hooks: list[Callable[[str, float], None]] = []
         model = ArmModel()
-        self.covers = BodyFilter(model)
+        self.rig = Rig(BodyFilter(model))
         self._motion = MotionStack(SimulatedArm(env), limits, model, on_tick=self._after_tick, on_move=self._announce)
 
     def observe(self) -> Observation:

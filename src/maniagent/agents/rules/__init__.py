@@ -3,8 +3,8 @@
 from __future__ import annotations
 
 from ...perception.lexicon import Lexicon
+from ...perception.rig import Rig
 from ...perception.sight import Sight
-from ...perception.views import RobotFilter
 from ..protocols import Agents
 from .controller import RulesControllerAgent
 from .objects import RulesObjectAgent
@@ -14,9 +14,9 @@ from .scene import RulesSceneAgent
 __all__ = ["rules_agents"]
 
 
-def rules_agents(covers_robot: RobotFilter, lexicon: Lexicon | None = None) -> Agents:
-    """The `rules` agents for a robot whose own body `covers_robot` tells apart in the images."""
-    sight = Sight(covers_robot)
+def rules_agents(rig: Rig, lexicon: Lexicon | None = None) -> Agents:
+    """The `rules` agents for a robot with that rig."""
+    sight = Sight(rig)
     words = lexicon if lexicon is not None else Lexicon.load()
     return Agents(
         name="rules",

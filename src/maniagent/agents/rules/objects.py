@@ -3,14 +3,16 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
 from ...errors import DetectionFailure, FailureStage, GraspFailure
 from ...geometry import FloatArray
-from ...perception.grasps import GRIPPER, TUNING, GraspTuning, propose_grasps
+from ...perception.grasps import propose_grasps
 from ...perception.identity import find_again
 from ...perception.lexicon import Lexicon
+from ...perception.rig import Rig
 from ...perception.segmentation import TableView
 from ...perception.segments import Segment
 from ...perception.sight import Sight
@@ -24,8 +26,6 @@ from .language import parse_instruction
 
 LEAD_WEIGHT = 20.0
 """1/m: what a metre ahead of the object's middle is worth to a grasp that drags it, beside its score."""
-ALL_AROUND = GraspTuning(centres=120, yaws=24, count=40)
-"""For dragging, grasps are wanted on every side of an object, not only the best few."""
 UNMOVED = 0.02
 """m; what looks the same within that of its last place is the same thing."""
 
@@ -55,7 +55,7 @@ class RulesObjectAgent:
         if len(set(chosen)) < len(chosen):
             raise DetectionFailure(f"{' and '.join(map(repr, subtask.objects))} mean the same thing.")
         command = parse_instruction(subtask.text)[0]
-        grasps = _grasps(view.segments[chosen[0]], view, command, viewpoint, attempts)
+        grasps = _grasps(view.segments[chosen[0]], view, command, viewpoint, attempts, self._sight.rig)
         names = subtask.objects
         objects = tuple(view.segments[k].to_object(i, names[i], grasps if i == 0 else ()) for i, k in enumerate(chosen))
         others = [k for k in range(len(view.segments)) if k not in chosen]
@@ -86,15 +86,22 @@ class RulesObjectAgent:
 
 
 def _grasps(
-    segment: Segment, view: TableView, command: Command, viewpoint: Viewpoint, attempts: Sequence[SubtaskRecord]
+    segment: Segment,
+    view: TableView,
+    command: Command,
+    viewpoint: Viewpoint,
+    attempts: Sequence[SubtaskRecord],
+    rig: Rig,
 ) -> tuple[GraspPose, ...]:
     """The object's grasps, best first; each attempt that failed to hold it moves on to the next."""
     drags = command.action in (Action.DRAG, Action.PUSH)
-    grasps = propose_grasps(segment, view.height_map, tuning=ALL_AROUND if drags else TUNING)
+    # For dragging, grasps are wanted on every side of an object, not only the best few.
+    tuning = replace(rig.grasping, centres=120, yaws=24, count=40) if drags else rig.grasping
+    grasps = propose_grasps(segment, view.height_map, rig.gripper, tuning)
     if not grasps:
         width = segment.extent[1]
-        why = f"it is {width * 100:.1f} cm wide, the gripper opens {GRIPPER.max_opening * 100:.1f} cm"
-        if width + 0.006 < GRIPPER.max_opening:
+        why = f"it is {width * 100:.1f} cm wide, the gripper opens {rig.gripper.max_opening * 100:.1f} cm"
+        if width + 0.006 < rig.gripper.max_opening:
             why = "it lies too flat, or other things are in the way"
         raise GraspFailure(f"No grasp was found for the {command.object}: {why}.")
     if drags:
