@@ -8,16 +8,19 @@ assert robot.calls[-1] == "go_home"
 
 from __future__ import annotations
 
-from collections.abc import Callable, Iterator, Sequence
-from typing import Generic, TypeVar
+from collections.abc import Callable, Iterator, Mapping, Sequence
+from typing import Any, Generic, TypeVar
 
 import numpy as np
 from numpy.typing import NDArray
+from pydantic import BaseModel, ValidationError
 
 from .agents.memory import Memory
 from .agents.protocols import Agents, Located
-from .errors import MotionRejected
+from .errors import FormatFailure, MotionRejected
 from .geometry import look_at, make_transform, rotation_z, top_down_rotation
+from .models.question import Question, Unfit
+from .perception.rig import Rig
 from .robots.robot import Boxes
 from .types import (
     ActionSequence,
@@ -31,9 +34,11 @@ from .types import (
     RobotState,
     SceneDescription,
     Subtask,
+    SubtaskRecord,
 )
 
 T = TypeVar("T")
+A = TypeVar("A", bound=BaseModel)
 
 
 class Script(Generic[T]):
@@ -69,6 +74,7 @@ class ScriptedAgents:
         self.sought: list[Subtask] = []
         self.feedback: list[str] = []
         """What the controller was told at every question; empty at the first of a sub-task."""
+        self.learned: list[SubtaskRecord] = []
 
     def as_agents(self, name: str = "scripted") -> Agents:
         """The four roles as the loop takes them."""
@@ -94,6 +100,41 @@ class ScriptedAgents:
         self.feedback.append(feedback)
         return self._sequences.next()
 
+    def learn(self, record: SubtaskRecord) -> None:
+        """Write it down."""
+        self.learned.append(record)
+
+
+class ScriptedModel:
+    """A `ChatModel` that gives, role by role, the answers it was told to give; where one is refused, the next."""
+
+    def __init__(
+        self,
+        answers: Mapping[str, Sequence[Mapping[str, Any] | BaseException]],
+        name: str = "scripted",
+        rounds: int = 3,
+    ) -> None:
+        """`answers` by role, as JSON objects; `rounds` is how many answers a question may take."""
+        self.name = name
+        self._scripts = {role: Script(given) for role, given in answers.items()}
+        self._rounds = rounds
+        self.asked: list[Question[Any]] = []
+        self.refusals: list[str] = []
+        """Why answers were refused."""
+
+    def ask(self, question: Question[A]) -> A:
+        """The next answer of that role that fits."""
+        self.asked.append(question)
+        for _ in range(self._rounds):
+            try:
+                answer = question.answer.model_validate(self._scripts[question.role].next())
+                question.check(answer)
+            except (ValidationError, Unfit) as refusal:
+                self.refusals.append(str(refusal))
+            else:
+                return answer
+        raise FormatFailure(f"No answer of {self.name} fits: {self.refusals[-1]}")
+
 
 class FakeRobot:
     """A `Robot` without a body: it writes down what is asked of it.
@@ -116,6 +157,7 @@ class FakeRobot:
         self._refuse = refuse
         self._accepted: tuple[Sequence[KeyPoint], Boxes] | None = None
         self._hooks: list[Callable[[str, float], None]] = []
+        self.rig = Rig(no_body)
         self.calls: list[str] = []
         """Names of the methods called, in order."""
         self.checked: list[Sequence[KeyPoint]] = []
@@ -157,13 +199,14 @@ class FakeRobot:
         """Write it down."""
         self.calls.append("stop")
 
-    def covers(self, points: NDArray[np.float32], state: RobotState) -> BoolArray:
-        """No body, no point on it."""
-        return np.zeros(len(points), bool)
-
     def on_move(self, hook: Callable[[str, float], None]) -> None:
         """Call `hook` for every key point executed."""
         self._hooks.append(hook)
+
+
+def no_body(points: NDArray[np.float32], state: RobotState) -> BoolArray:
+    """The `covers_robot` of a robot without a body: no point lies on it."""
+    return np.zeros(len(points), bool)
 
 
 def made_observation(eye: tuple[float, float, float] = (0.8, 0.0, 0.5)) -> Observation:

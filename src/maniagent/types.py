@@ -404,6 +404,8 @@ class SubtaskRecord:
     queries: tuple[str, ...] = ()
     surroundings: tuple[ObjectInfo, ...] = ()
     """Everything else that was on the table, as it was before the attempt."""
+    sequence: ActionSequence | None = None
+    """What the robot was told to do; None where no sequence was accepted, so that nothing moved."""
 
 
 @dataclass(frozen=True)

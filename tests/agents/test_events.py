@@ -33,3 +33,13 @@ def test_times_count_from_the_logs_creation() -> None:
 
 def test_nobody_has_to_listen() -> None:
     EventLog().emit("observed", turn=1)
+
+
+def test_the_log_knows_the_turn_it_is() -> None:
+    log = EventLog()
+    turns = [log.turn]
+    for turn in (1, 2):
+        log.emit("observed", turn=turn)
+        log.emit("frame", rgb=None)
+        turns.append(log.turn)
+    assert turns == [0, 1, 2]

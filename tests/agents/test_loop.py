@@ -99,12 +99,19 @@ def test_a_turn_is_told_in_its_order_and_the_last_look_ends_the_run() -> None:
     listener, robot = Listener(), FakeRobot()
     result = carry_out(ScriptedAgents([TRY, DONE], [FOUND], [TAKE]), robot, listener)
     assert listener.kinds == [
-        "observed", "described", "reasoned", "located", "planned", "move", "executed",
-        "observed", "described", "reasoned",
+        "begun", "homed",
+        "observed", "described", "reasoned", "located", "checked", "planned", "move", "homed", "executed",
+        "observed", "described", "reasoned", "homed",
     ]  # fmt: skip
-    assert [event.data["turn"] for event in listener.events] == [1] * 7 + [2] * 3
-    assert robot.calls == ["observe", "check", "execute", "go_home", "observe", "go_home"]
+    assert [event.data["turn"] for event in listener.events[1:]] == [0] + [1] * 9 + [2] * 4
+    assert robot.calls == ["go_home", "observe", "check", "execute", "go_home", "observe", "go_home"]
     assert (result.verdict, result.reason) == (RunVerdict.ACHIEVED, "it is there")
+
+
+def test_what_the_loop_was_given_is_told_first() -> None:
+    listener, robot = Listener(), FakeRobot()
+    carry_out(ScriptedAgents([DONE]), robot, listener, turns=7)
+    assert listener.events[0].data == {"instruction": "put it there", "budget": Budget(turns=7), "rig": robot.rig}
 
 
 def test_the_record_holds_the_attempt_and_next_turns_verdict_on_it() -> None:
@@ -113,7 +120,32 @@ def test_the_record_holds_the_attempt_and_next_turns_verdict_on_it() -> None:
     assert (record.text, record.queries, record.objects) == ("put it there", ("pepper", "plate"), FOUND.objects)
     assert record.outcome.completed
     assert (record.verdict, record.evidence) == (Verdict.SUCCESS, "it is there")
+    assert record.sequence == TAKE
     assert agents.remembered == [0, 1]
+
+
+def test_the_controller_hears_the_verdict_on_every_attempt_once() -> None:
+    again_after_nothing = AGAIN.model_copy(update={"text": "something else"})
+    agents = ScriptedAgents(
+        [TRY, again_after_nothing, AGAIN, DONE], [FOUND, CameraFailure("Blocked."), FOUND], [TAKE, OTHER]
+    )
+    result = carry_out(agents, FakeRobot())
+    assert [(r.sequence, r.verdict) for r in agents.learned] == [(TAKE, Verdict.FAILURE), (OTHER, Verdict.SUCCESS)]
+    assert [r.sequence for r in result.subtasks] == [TAKE, OTHER]
+
+
+def test_nothing_that_moved_is_nothing_that_was_carried_out() -> None:
+    agents = ScriptedAgents([TRY, CANNOT], [FOUND], [NONSENSE])
+    (record,) = carry_out(agents, FakeRobot()).subtasks
+    assert record.sequence is None
+    assert agents.learned == [record]
+
+
+def test_every_answer_of_the_robot_to_a_check_is_told() -> None:
+    listener, robot = Listener(), FakeRobot(refuse=refuse_first(1))
+    carry_out(ScriptedAgents([TRY, DONE], [FOUND], [TAKE]), robot, listener)
+    assert [data["reason"] for data in listener.data("checked")] == ["It is out of reach.", ""]
+    assert [data["keypoints"] for data in listener.data("checked")] == robot.checked
 
 
 def test_everything_located_is_in_the_way() -> None:
@@ -283,9 +315,9 @@ def test_time_runs_out_between_turns(monkeypatch: pytest.MonkeyPatch) -> None:
             return super().go_home()
 
     agents = ScriptedAgents([TRY, AGAIN], [FOUND], [TAKE])
-    result = carry_out(agents, robot := Slow(), seconds=10.0)
+    result = carry_out(agents, robot := Slow(), seconds=15.0)
     assert (result.verdict, len(robot.executed)) == (RunVerdict.OUT_OF_BUDGET, 2)
-    assert result.seconds["execution"] == pytest.approx(18.0)
+    assert result.seconds["execution"] == pytest.approx(24.0)
 
 
 # Stopped from outside -------------------------------------------------------------------------------------------

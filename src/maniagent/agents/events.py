@@ -5,12 +5,16 @@ Kinds of events and their data:
 | kind | data |
 |---|---|
 | run_started | instruction, task (or None), seed, agents (their name) |
+| begun | instruction, budget, rig: what the loop was given |
 | observed | turn, observation |
 | described | turn, scene |
 | reasoned | turn, subtask |
 | located | turn, objects, detections |
+| cache | turn, found ("text", "form" or ""), sequence (the one that was served, or None) |
+| checked | turn, keypoints, reason (why the robot refused them, or empty) |
 | planned | turn, sequence, keypoints |
 | move | turn, description, seconds (robot time the move will take) |
+| homed | turn, report (of the way home) |
 | executed | turn, report |
 | failed | turn, stage, reason |
 | frame | rgb, robot_time: the main view while the arm moves, for the video; only in runs that are recorded |
@@ -41,9 +45,16 @@ class EventLog:
         self._observers = tuple(observers)
         self._clock = clock
         self._start = clock()
+        self._turn = 0
+
+    @property
+    def turn(self) -> int:
+        """The turn that was told of last, for those who tell of it without counting turns; 0 before the first."""
+        return self._turn
 
     def emit(self, kind: str, **data: Any) -> None:
         """Tell every observer, in the order they were given."""
+        self._turn = data.get("turn", self._turn)
         event = Event(kind, self._clock() - self._start, data)
         for observer in self._observers:
             observer.on_event(event)

@@ -26,6 +26,7 @@ from ..types import (
     RunVerdict,
     Subtask,
     SubtaskRecord,
+    Verdict,
 )
 from .binding import bind
 from .events import EventLog
@@ -62,10 +63,11 @@ class AgentLoop:
     def run(self, instruction: str) -> RunResult:
         """Carry out an instruction; never raises a StageFailure. KeyboardInterrupt stops the arm and is raised on."""
         self._run = run = _Run(self._robot, self._agents, self._log, self._budget, instruction)
+        self._log.emit("begun", instruction=instruction, budget=self._budget, rig=self._robot.rig)
         try:
+            run.go_home()  # where the arm is out of the cameras' way
             verdict, reason = run.until_the_end()
-            with run.timed("execution"):
-                home = self._robot.go_home()
+            home = run.go_home()
         except BaseException:
             self._robot.stop()
             raise
@@ -119,14 +121,22 @@ class _Run:
         self.log.emit("described", turn=turn, scene=scene)
         with self.timed("reasoning"):
             subtask = self.agents.reasoning.next_subtask(self.instruction, scene, self.memory)
-        self.memory.judge_last(subtask.previous, subtask.reason)
         self.log.emit("reasoned", turn=turn, subtask=subtask)
+        self._judge_last(subtask)
         if subtask.done:
             return RunVerdict.ACHIEVED, subtask.reason
         if subtask.cannot:
             return RunVerdict.CANNOT, subtask.reason
         self._attempt(subtask, observation)
         return None
+
+    def _judge_last(self, subtask: Subtask) -> None:
+        """Write the verdict into memory; the controller hears it too, once for every attempt."""
+        waiting = self.memory.last is not None and self.memory.last.verdict is Verdict.INITIAL
+        self.memory.judge_last(subtask.previous, subtask.reason)
+        judged = self.memory.last
+        if waiting and judged is not None and judged.verdict is not Verdict.INITIAL:
+            self.agents.controller.learn(judged)
 
     def _attempt(self, subtask: Subtask, observation: Observation) -> None:
         """Try one sub-task; what came of it is in memory afterwards, failures before the first move included."""
@@ -136,7 +146,7 @@ class _Run:
                 located = self.agents.objects.locate(subtask, observation, self.memory)
             self.log.emit("located", turn=self.turn, objects=located.objects, detections=located.detections)
             boxes = {info.index: info.box for info in (*located.objects, *located.surroundings)}
-            objects, keypoints = self._plan(subtask, located, boxes, Viewpoint.of(observation))
+            sequence, objects, keypoints = self._plan(subtask, located, boxes, Viewpoint.of(observation))
         except CameraFailure:
             raise
         except StageFailure as failure:
@@ -146,26 +156,43 @@ class _Run:
             return
         with self.timed("execution"):
             report = self.robot.execute(keypoints, boxes)
-            home = self.robot.go_home()
+        home = self.go_home()
         if report.completed and not home.completed:
             report = home
         self.log.emit("executed", turn=self.turn, report=report)
         if not report.completed:
             self.log.emit("failed", turn=self.turn, stage=report.stage, reason=report.reason)
-        self._remember(subtask, objects, located, report)
+        self._remember(subtask, objects, located, report, sequence)
+
+    def go_home(self) -> ExecutionReport:
+        """Bring the arm to its safe pose."""
+        with self.timed("execution"):
+            home = self.robot.go_home()
+        self.log.emit("homed", turn=self.turn, report=home)
+        return home
 
     def _remember(
-        self, subtask: Subtask, objects: tuple[ObjectInfo, ...], located: Located, report: ExecutionReport
+        self,
+        subtask: Subtask,
+        objects: tuple[ObjectInfo, ...],
+        located: Located,
+        report: ExecutionReport,
+        sequence: ActionSequence | None = None,
     ) -> None:
         record = SubtaskRecord(
-            subtask.text, objects, report, queries=subtask.objects, surroundings=located.surroundings
+            subtask.text,
+            objects,
+            report,
+            queries=subtask.objects,
+            surroundings=located.surroundings,
+            sequence=sequence,
         )
         self.memory.add(record)
 
     def _plan(
         self, subtask: Subtask, located: Located, boxes: Boxes, viewpoint: Viewpoint
-    ) -> tuple[tuple[ObjectInfo, ...], tuple[KeyPoint, ...]]:
-        """Key points that the robot accepts, and the objects with the grasps these use.
+    ) -> tuple[ActionSequence, tuple[ObjectInfo, ...], tuple[KeyPoint, ...]]:
+        """A sequence whose key points the robot accepts, the objects with the grasps these use, the key points.
 
         A sequence that doesn't bind or can't be moved goes back to the controller with the reason, until its answers
         are used up or it repeats itself.
@@ -188,7 +215,7 @@ class _Run:
                 refused, refusal = sequence, failure
             else:
                 self.log.emit("planned", turn=self.turn, sequence=sequence, keypoints=keypoints)
-                return objects, keypoints
+                return sequence, objects, keypoints
         raise refusal
 
     def _tell(self, failure: StageFailure) -> None:
@@ -204,8 +231,10 @@ class _Run:
             try:
                 self.robot.check(keypoints, boxes)
             except MotionRejected as rejection:
+                self.log.emit("checked", turn=self.turn, keypoints=keypoints, reason=str(rejection))
                 first_rejection = first_rejection or rejection
             else:
+                self.log.emit("checked", turn=self.turn, keypoints=keypoints, reason="")
                 return choice, keypoints
         raise first_rejection or MotionRejected("There is nothing to move.")
 

@@ -10,7 +10,7 @@ from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Protocol
 
-from ..types import ActionSequence, Detection, ObjectInfo, Observation, SceneDescription, Subtask
+from ..types import ActionSequence, Detection, ObjectInfo, Observation, SceneDescription, Subtask, SubtaskRecord
 from .memory import Memory
 
 
@@ -54,6 +54,10 @@ class ControllerAgent(Protocol):
 
     def write(self, subtask: Subtask, objects: Sequence[ObjectInfo], feedback: str = "") -> ActionSequence:
         """A parameterised sequence over the objects' indices; `feedback` says why the last one was refused."""
+        ...
+
+    def learn(self, record: SubtaskRecord) -> None:
+        """Take note of how an attempt was judged; told once for every attempt that is, on the turn after it."""
         ...
 
 

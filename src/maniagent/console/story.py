@@ -21,7 +21,10 @@ _STAGE_ENDED_BY = {
     "described": "scene",
     "reasoned": "reasoning",
     "located": "detection",
+    "cache": "control",
+    "checked": "control",
     "planned": "control",
+    "homed": "execution",
     "executed": "execution",
 }
 _STAGE_OF_FAILURE = {"camera": "observe", "grasp": "detection", "format": "control"}
@@ -143,6 +146,8 @@ def _add(story: Story, event: Json) -> None:
         story.finish = event
         if story.turns:  # between the last word of the agents and the end the arm goes home
             story.turns[-1].spans.append(Span("execution", before, event["time"]))
+        return
+    if not event.get("turn"):  # before the first turn: what the loop was given, the arm's way home
         return
     if not story.turns or story.turns[-1].number != event["turn"]:
         story.turns.append(Turn(event["turn"]))

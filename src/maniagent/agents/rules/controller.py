@@ -27,6 +27,7 @@ from ...types import (
     Part,
     PointAnchor,
     Subtask,
+    SubtaskRecord,
 )
 from .commands import Action, Command, Direction, Relation
 from .language import parse_instruction
@@ -78,6 +79,9 @@ class RulesControllerAgent:
                 return _drag(command)
             case Action.PLACE | Action.STACK:
                 return _pick_and_place(command, feedback)
+
+    def learn(self, record: SubtaskRecord) -> None:
+        """Rules don't learn."""
 
 
 def direction_of(command: Command, start: FloatArray, viewpoint: Viewpoint) -> FloatArray:
