@@ -1,0 +1,97 @@
+"""The forms of the agents' answers: flat, small, every text and list bounded, so that a weak model copes with them.
+
+The order of the fields is the order of thinking: evidence stands before what follows from it.
+"""
+
+from __future__ import annotations
+
+import re
+from typing import Annotated, Literal
+
+from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
+
+_NO_NAME = re.compile(r"[^\w '()/,&+.-]")
+
+
+def _tidy(text: object) -> object:
+    return " ".join(text.split()) if isinstance(text, str) else text
+
+
+def _is_name(name: str) -> str:
+    if found := _NO_NAME.search(name):
+        raise ValueError(f"a name is plain words, without {found[0]!r}")
+    return name
+
+
+Name = Annotated[str, BeforeValidator(_tidy), AfterValidator(_is_name), Field(min_length=1, max_length=60)]
+"""Of an object."""
+Sentence = Annotated[str, BeforeValidator(_tidy), Field(max_length=300)]
+Paragraph = Annotated[str, BeforeValidator(_tidy), Field(max_length=1200)]
+Offset = Annotated[float, Field(ge=-1.0, le=1.0, allow_inf_nan=False)]
+"""m"""
+Coordinate = Annotated[float, Field(ge=-2.0, le=2.0, allow_inf_nan=False)]
+"""m"""
+Place = Literal["grasp", "surface", "top", "base", "centre", "left", "right", "near", "far", "point", "here"]
+
+
+class Answer(BaseModel):
+    """Base of all answers: immutable, nothing unknown."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+
+class SeenObject(Answer):
+    """One thing on the table."""
+
+    name: Name
+    state: Sentence
+
+
+class Seen(Answer):
+    """What the SceneAgent's model reports."""
+
+    objects: Annotated[tuple[SeenObject, ...], Field(max_length=24)]
+    summary: Paragraph
+
+
+class Thought(Answer):
+    """What the ReasoningAgent's model decides."""
+
+    evidence: Paragraph
+    previous: Literal["none", "success", "failure"]
+    remaining: Paragraph
+    next: Literal["act", "done", "cannot", "measure"]
+    subtask: Annotated[str, BeforeValidator(_tidy), Field(max_length=200)] = ""
+    objects: Annotated[tuple[Name, ...], Field(max_length=8)] = ()
+
+
+class Choice(Answer):
+    """Which numbered thing is meant."""
+
+    reason: Sentence
+    number: Annotated[int, Field(ge=0, le=64)]
+    """0 for none of them."""
+
+
+class WrittenStep(Answer):
+    """One step of a movement; `steps.to_sequence` says what it means."""
+
+    do: Annotated[str, BeforeValidator(_tidy), Field(min_length=1, max_length=120)]
+    to: Place
+    object: Annotated[int, Field(ge=0, le=63)] | None = None
+    x: Coordinate | None = None
+    y: Coordinate | None = None
+    right: Offset = 0.0
+    away: Offset = 0.0
+    up: Offset = 0.0
+    turn: Annotated[float, Field(ge=-360.0, le=360.0, allow_inf_nan=False)] = 0.0
+    """Degrees, counter-clockwise seen from above."""
+    lie: Literal["keep", "away", "across"] = "keep"
+    gripper: Literal["open", "close", "keep"] = "keep"
+
+
+class Written(Answer):
+    """What the ControllerAgent's model writes."""
+
+    skill: Annotated[str, BeforeValidator(_tidy), Field(min_length=1, max_length=40)]
+    steps: Annotated[tuple[WrittenStep, ...], Field(min_length=1, max_length=16)]

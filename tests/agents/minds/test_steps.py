@@ -1,0 +1,103 @@
+"""From a model's flat steps to sequences that bind."""
+
+import math
+from typing import Any
+
+import numpy as np
+import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+
+from maniagent.agents.binding import bind
+from maniagent.agents.minds.answers import Written
+from maniagent.agents.minds.prompts import Prompts
+from maniagent.agents.minds.steps import to_sequence
+from maniagent.agents.rules.controller import RulesControllerAgent
+from maniagent.geometry import rotation_z, yaw_of_top_down
+from maniagent.models.question import Unfit
+from maniagent.perception.viewpoint import Viewpoint
+from maniagent.testing import made_object
+from maniagent.types import KeyPoint, Subtask, Verdict
+
+VIEWPOINT = Viewpoint(np.array([0.0, 1.0]), np.array([-1.0, 0.0]))
+KNIFE = made_object(0, "knife", (0.20, 0.15), size=(0.18, 0.02, 0.01), yaw=0.9)
+PLATE = made_object(1, "plate", (0.30, -0.10), size=(0.18, 0.18, 0.02))
+TAKE: list[dict[str, Any]] = [
+    {"do": "above", "to": "grasp", "object": 0, "up": 0.1, "gripper": "open"},
+    {"do": "take", "to": "grasp", "object": 0, "gripper": "close"},
+    {"do": "lift", "to": "here", "up": 0.1},
+]
+
+
+def keypoints(*steps: dict[str, Any], viewpoint: Viewpoint = VIEWPOINT) -> tuple[KeyPoint, ...]:
+    written = Written.model_validate({"skill": "test", "steps": steps})
+    return bind(to_sequence(written, viewpoint), (KNIFE, PLATE), viewpoint)
+
+
+def examples() -> list[tuple[str, Written]]:
+    """The examples in the controller's prompt, with their sub-tasks."""
+    lines = Prompts.load().controller.instructions.splitlines()
+    found = []
+    for i, line in enumerate(lines):
+        if line.startswith('{"skill"'):
+            end = next(k for k in range(i, len(lines)) if lines[k].endswith("]}"))
+            found.append((lines[i - 1], Written.model_validate_json("".join(lines[i : end + 1]))))
+    return found
+
+
+@pytest.mark.parametrize(("subtask", "written"), examples())
+def test_the_prompts_examples_move_as_the_rules_do(subtask: str, written: Written) -> None:
+    text, named = subtask.rstrip(")").split(" (0 ")
+    names = named.split(", 1 ")
+    objects = [made_object(i, name, (0.2 + 0.1 * i, 0.1), yaw=0.4) for i, name in enumerate(names)]
+    wanted = RulesControllerAgent().write(
+        Subtask(previous=Verdict.INITIAL, reason="", text=text, objects=tuple(names)), objects
+    )
+    ours, theirs = bind(to_sequence(written, VIEWPOINT), objects, VIEWPOINT), bind(wanted, objects, VIEWPOINT)
+    assert to_sequence(written, VIEWPOINT).skill == wanted.skill
+    assert [p.gripper for p in ours] == [p.gripper for p in theirs]
+    for a, b in zip(ours, theirs, strict=True):
+        np.testing.assert_allclose(a.T_base_tcp, b.T_base_tcp, atol=0.007)  # travelling 6 mm higher or not
+
+
+def test_there_is_an_example_for_every_skill() -> None:
+    assert [written.skill for _, written in examples()] == ["pick-and-place", "drag", "rotate"]
+
+
+def test_what_is_held_is_known_without_being_said() -> None:
+    *_, down, up = keypoints(
+        *TAKE,
+        {"do": "lower", "to": "surface", "object": 1, "gripper": "open"},
+        {"do": "leave", "to": "here", "up": 0.1},
+    )
+    assert (down.held, up.held) == (0, None)
+    grasp_height = KNIFE.grasps[0].T_base_grasp[2, 3] - KNIFE.bottom_z
+    assert down.T_base_tcp[2, 3] == pytest.approx(PLATE.surface_z + grasp_height)
+
+
+@given(st.floats(-math.pi, math.pi), st.sampled_from(["away", "across"]))
+def test_a_long_thing_lies_as_told_for_every_viewpoint(view_yaw: float, lie: str) -> None:
+    turn = rotation_z(view_yaw)[:2, :2]
+    viewpoint = Viewpoint(turn @ VIEWPOINT.right, turn @ VIEWPOINT.away)
+    *_, taken, put = keypoints(
+        *TAKE[:2], {"do": "put", "to": "left", "object": 1, "lie": lie, "gripper": "open"}, viewpoint=viewpoint
+    )
+    turned = yaw_of_top_down(put.T_base_tcp[:3, :3]) - yaw_of_top_down(taken.T_base_tcp[:3, :3])
+    axis = rotation_z(KNIFE.yaw + turned)[:2, 0]
+    wanted = viewpoint.away if lie == "away" else viewpoint.right
+    assert abs(axis @ wanted) == pytest.approx(1.0)
+
+
+@pytest.mark.parametrize(
+    ("steps", "said"),
+    [
+        ([TAKE[1]], "no step before opens them"),
+        ([{"do": "go", "to": "surface"}], "doesn't say of which"),
+        ([{"do": "go", "to": "point", "x": 0.2}], "lacks its x or y"),
+        ([*TAKE, {"do": "drop", "to": "surface", "object": 1, "up": 0.2, "gripper": "open"}], "drops the object"),
+        ([{"do": "lay", "to": "surface", "object": 1, "lie": "away"}], "none is held"),
+    ],
+)
+def test_steps_that_mean_nothing_are_sent_back_with_their_number(steps: list[dict[str, Any]], said: str) -> None:
+    with pytest.raises(Unfit, match=rf"Step {len(steps)} .*{said}"):
+        keypoints(*steps)
