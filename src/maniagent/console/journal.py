@@ -1,13 +1,15 @@
 """One event as one line of JSON: small enough to read, complete enough to tell the story.
 
-Images, masks and whole sequences go into files of their own; a line names them. Numbers that JSON can't hold
-(NaN, infinity) become null, so that every line is strict JSON.
+Images and masks go into files of their own; a line names them. Floats are written so that they read back bit by bit,
+which is what a replay compares by. Numbers that JSON can't hold (NaN, infinity) become null, so that every line is
+strict JSON.
 """
 
 from __future__ import annotations
 
 import dataclasses
 import enum
+import inspect
 import json
 import math
 from collections.abc import Mapping
@@ -17,7 +19,7 @@ from typing import Any
 import numpy as np
 from pydantic import BaseModel
 
-from ..types import CameraFrame, Detection, Event, GraspPose
+from ..types import CameraFrame, Detection, Event, GraspPose, ObjectInfo
 
 _LONGEST_ARRAY = 64
 """Larger arrays are summarised by shape and type."""
@@ -43,7 +45,7 @@ def to_plain(value: Any) -> Any:
         case str():
             return value.encode("utf-8", "replace").decode()  # a lone surrogate can't be written to a file
         case float() | np.floating():
-            return round(float(value), 6) if math.isfinite(value) else None
+            return float(value) if math.isfinite(value) else None
         case np.generic():
             return value.item()
         case Path():
@@ -69,8 +71,12 @@ def to_plain(value: Any) -> Any:
             return [to_plain(item) for item in value]
         case set() | frozenset():
             return sorted((to_plain(item) for item in value), key=str)
+        case ObjectInfo():
+            return _fields(dataclasses.replace(value, grasps=value.grasps[:_GRASPS_KEPT]))
         case _ if dataclasses.is_dataclass(value):
             return _fields(value)
+        case _ if inspect.isroutine(value):
+            return f"{value.__module__}.{value.__qualname__}"
         case _:
             return str(value)
 
@@ -88,11 +94,8 @@ def _frame(frame: CameraFrame) -> dict[str, Any]:
 
 
 def _fields(value: Any) -> dict[str, Any]:
-    plain = {}
-    for field in dataclasses.fields(value):
-        item = getattr(value, field.name)
-        plain[field.name] = to_plain(item[:_GRASPS_KEPT] if field.name == "grasps" else item)
-    return plain
+    """A dataclass's fields by name, but for those that its repr leaves out, too."""
+    return {field.name: to_plain(getattr(value, field.name)) for field in dataclasses.fields(value) if field.repr}
 
 
 def read_lines(path: Path) -> list[dict[str, Any]]:

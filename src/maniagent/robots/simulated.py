@@ -11,12 +11,11 @@ from ..envs.tabletop import TabletopEnv
 from ..geometry import FloatArray
 from ..motion import ArmModel, ArmState, MotionLimits, MotionStack
 from ..perception.rig import Rig
-from ..types import BoolArray, ExecutionReport, KeyPoint, Observation, RobotState
+from ..types import ExecutionReport, KeyPoint, Observation
+from .body_filter import BodyFilter as BodyFilter
 from .robot import Boxes
 
 FRAMES_PER_SECOND = 10.0
-SELF_MARGIN = 0.02
-"""m around the robot's own body that perception leaves out: its model isn't exact, nor is the depth at its edges."""
 
 
 class SimulatedArm:
@@ -51,18 +50,6 @@ class SimulatedArm:
     def stop(self) -> None:
         """Hold the joints where they are; the simulated gripper keeps its last command."""
         self._env.advance(self._env.robot_state().joint_positions, self._last_opening)
-
-
-class BodyFilter:
-    """Which points lie on the arm, by its kinematics. Made for agents: from here no way leads to the simulation."""
-
-    def __init__(self, model: ArmModel, margin: float = SELF_MARGIN) -> None:
-        self._model = model
-        self._margin = margin
-
-    def __call__(self, points: NDArray[np.float32], state: RobotState) -> BoolArray:
-        """Which of the points (N, 3), base frame, lie on the robot itself: (N,) bool."""
-        return self._model.covers(points, state.joint_positions, state.gripper_opening, self._margin)
 
 
 class SimulatedRobot:
