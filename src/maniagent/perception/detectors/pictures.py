@@ -51,8 +51,8 @@ def draw_marks(rgb: Picture, masks: Sequence[BoolArray]) -> Picture:
         raise ValueError(f"all masks must have the picture's size {rgb.shape[:2]}")
     scale = max(1, -(-MIN_SIDE // min(rgb.shape[:2])))
     size = (rgb.shape[1] * scale, rgb.shape[0] * scale)
-    picture = cv2.resize(rgb, size, interpolation=cv2.INTER_CUBIC) if scale > 1 else rgb.copy()
-    large = [cv2.resize(mask.astype(np.uint8), size, interpolation=cv2.INTER_NEAREST) for mask in masks]
+    picture: Picture = np.array(cv2.resize(rgb, size, interpolation=cv2.INTER_CUBIC), np.uint8)
+    large = [mask.repeat(scale, axis=0).repeat(scale, axis=1).astype(np.uint8) for mask in masks]
     numbers = [i for i, mask in enumerate(large) if mask.any()]
     for i in numbers:
         _outline(picture, large[i], _colour(i))
