@@ -315,7 +315,7 @@ def test_time_runs_out_between_turns(monkeypatch: pytest.MonkeyPatch) -> None:
             return super().go_home()
 
     agents = ScriptedAgents([TRY, AGAIN], [FOUND], [TAKE])
-    result = carry_out(agents, robot := Slow(), seconds=15.0)
+    result = carry_out(agents, robot := Slow(), seconds=17.0)
     assert (result.verdict, len(robot.executed)) == (RunVerdict.OUT_OF_BUDGET, 2)
     assert result.seconds["execution"] == pytest.approx(24.0)
 

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
 from functools import cache
 
 import mujoco
@@ -128,7 +129,8 @@ def test_a_thing_in_a_dish_is_taken_without_the_dish() -> None:
 def bar(yaw: float, width: float = 0.02, height: float = 0.03, support_z: float = 0.0) -> tuple[Segment, HeightMap]:
     """An ideal bar, 10 cm long, at (0.28, 0) on a clean height map."""
     shape, cell, origin = (200, 200), 0.002, (0.08, -0.2)
-    grid = HeightMap(origin, cell, np.zeros(shape, np.float32), np.zeros((*shape, 3), np.uint8), np.zeros(shape, bool))
+    occupied = np.zeros(shape, bool)
+    grid = HeightMap(origin, cell, np.zeros(shape, np.float32), np.zeros((*shape, 3), np.uint8), occupied, ~occupied)
     centres = grid.positions(*np.indices(shape)) - [0.28, 0.0]
     along, across = np.moveaxis(centres @ rotation_z(yaw)[:2, :2], -1, 0)
     inside = (np.abs(along) < 0.05) & (np.abs(across) < width / 2)
@@ -170,7 +172,7 @@ def test_a_wall_beside_a_bar_leaves_no_grasp_across_it() -> None:
     rows, columns = grid.cells(np.array([[0.18, 0.014], [0.38, 0.030]])).T
     height = grid.height.copy()
     height[rows[0] : rows[1], columns[0] : columns[1]] = 0.05
-    walled = HeightMap(grid.origin, grid.cell, height, grid.rgb, height > 0)
+    walled = HeightMap(grid.origin, grid.cell, height, grid.rgb, height > 0, height == 0)
     assert propose_grasps(segment, grid)
     assert not [g for g in propose_grasps(segment, walled) if turned(_yaw(g), 0.0) < np.radians(40)]
 
@@ -198,3 +200,20 @@ def _penetration(seen: Look, grasp: GraspPose, solver: IKSolver) -> float:
 def _yaw(grasp: GraspPose) -> float:
     """rad: 0 where the fingers close along base y, that is across a thing whose long side is along base x."""
     return yaw_of_top_down(grasp.T_base_grasp[:3, :3])
+
+
+# Springy fingers ------------------------------------------------------------------------------------------------------
+
+
+def test_what_slips_through_the_closed_fingers_is_not_grasped() -> None:
+    segment, grid = bar(0.0, width=0.012)
+    assert propose_grasps(segment, grid)
+    assert not propose_grasps(segment, grid, replace(GRIPPER, closed_gap=0.03))
+
+
+def test_springy_fingers_prefer_where_they_are_held_apart() -> None:
+    thin, thick = bar(0.0, width=0.014), bar(0.0, width=0.026)
+    springy = replace(GRIPPER, closed_gap=0.010), replace(TUNING, firm=0.012)
+    weak, firm = (propose_grasps(*made, *springy)[0].score for made in (thin, thick))
+    assert weak < 0.6 * firm
+    assert propose_grasps(*thin)[0].score > 0.8 * propose_grasps(*thick)[0].score

@@ -18,7 +18,9 @@ CELL = 0.002
 def view(points: FloatArray, colour: tuple[int, int, int] = (200, 30, 30), name: str = "main") -> ViewPoints:
     """Points (N, 3) of one colour, as one view's foreground."""
     colours = np.tile(np.array(colour, np.uint8), (len(points), 1))
-    return ViewPoints(name, (480, 640), np.arange(len(points)), points.astype(np.float32), colours)
+    return ViewPoints(
+        name, (480, 640), np.arange(len(points)), points.astype(np.float32), colours, np.empty((0, 2), np.float32)
+    )
 
 
 def square(x: float, y: float, z: float, side: float = 0.03, step: float = 0.001) -> FloatArray:

@@ -1,4 +1,4 @@
-"""A thing is known again by colour and length, wherever it was put."""
+"""A thing is known again by colour and size, wherever it was put."""
 
 from __future__ import annotations
 
@@ -32,6 +32,12 @@ def test_likeness_is_mutual(
 ) -> None:
     first, second = thing(a, length), thing(b, other_length)
     assert same_thing(first, second) == same_thing(second, first)
+
+
+def test_a_strip_as_long_as_a_tray_is_no_tray() -> None:
+    tray = made_object(0, "tray", (0.25, 0.0), size=(0.15, 0.09, 0.03), colour=WHITE)
+    strip = made_object(1, "strip", (0.25, 0.05), size=(0.12, 0.016, 0.03), colour=WHITE)
+    assert not same_thing(tray, strip)
 
 
 @pytest.mark.parametrize("other", [GREEN, BLUE, WHITE])

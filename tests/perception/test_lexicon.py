@@ -256,12 +256,42 @@ def test_users_add_words_in_their_own_file(tmp_path: Path) -> None:
     assert mine.name(make("box", (0.3, 0.03, 0.03), "red")) == "ruler"
 
 
+def test_a_kind_may_have_several_looks(tmp_path: Path) -> None:
+    file = tmp_path / "mine.yaml"
+    long, short = "length: [0.25, 0.35]", "length: [0.05, 0.09]"
+    file.write_text(f"colours: {{}}\nnouns: {{ruler: {{{long}, also: [{{{short}}}]}}}}\n")
+    mine = Lexicon.load(file)
+    seen = [mine.name(make("box", (length, 0.03, 0.03), "red")) for length in (0.3, 0.07)]
+    assert seen == ["ruler", "ruler"]
+    assert mine.name(make("box", (0.15, 0.03, 0.03), "red")) != "ruler"
+
+
+@pytest.mark.parametrize(
+    ("said", "shape", "extent", "colours"),
+    [
+        ("spoon", "disc", (0.14, 0.03, 0.022), {"green": 0.65, "white": 0.35}),  # its handle in any colour
+        ("plate", "disc", (0.11, 0.11, 0.006), "green"),  # a toy's
+        ("plate", "vessel", (0.24, 0.24, 0.02), "white"),
+        ("eggplant", "disc", (0.07, 0.036, 0.036), "purple"),
+    ],
+)
+def test_looks_that_vary_within_a_kind(
+    said: str, shape: str, extent: tuple[float, float, float], colours: dict[str, float] | str
+) -> None:
+    other = block("purple", 0.045, xy=(0.1, 0.0))
+    thing = make(shape, extent, colours, xy=(0.3, 0.0))
+    assert LEXICON.ground(said, [other, thing, pepper("green", xy=(0.2, 0.1))], VIEW) == 1
+    assert said in LEXICON.name(thing)
+
+
 @pytest.mark.parametrize(
     ("text", "complaint"),
     [
         ("nouns: {}", "colours"),
         ("colours: {}\nnouns: {egg: {lenght: [0, 1]}}", "lenght"),
         ("colours: {}\nnouns: {egg: {length: [1, 0]}}", "backwards"),
+        ("colours: {}\nnouns: {egg: {also: [{lenght: [0, 1]}]}}", "lenght"),
+        ("colours: {}\nnouns: {egg: {also: [{colours: {ochre: [0, 1]}}]}}", "ochre"),
         ("colours: {}\nnouns: {egg: {length: [.nan, 1]}}", "finite"),
         ("colours: {}\nnouns: {egg: {colours: {ochre: [0, 1]}}}", "ochre"),
         ("colours: {}\nnouns: {egg: {synonyms: [oval]}, ball: {synonyms: [oval]}}", "means both"),

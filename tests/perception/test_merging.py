@@ -55,7 +55,7 @@ class Table:
 
     @property
     def grid(self) -> HeightMap:
-        return HeightMap((0.16, -0.12), CELL, self.height, self.rgb, self.labels > 0)
+        return HeightMap((0.16, -0.12), CELL, self.height, self.rgb, self.labels > 0, self.labels == 0)
 
     def merged(self) -> np.ndarray:
         """The labels after merging."""

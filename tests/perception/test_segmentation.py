@@ -28,8 +28,9 @@ from maniagent.envs.objects import object_names
 from maniagent.errors import CameraFailure
 from maniagent.geometry import make_transform, top_down_rotation
 from maniagent.motion import ArmModel, IKSolver
+from maniagent.perception.heightmap import HeightMap
 from maniagent.perception.rig import Rig
-from maniagent.perception.segmentation import TableView, segment
+from maniagent.perception.segmentation import TableView, find_supports, segment
 
 ELONGATED = ("red_chili", "green_chili", "carrot", "eggplant", "banana", "corn", "knife", "fork", "spoon", "marker")
 
@@ -221,3 +222,44 @@ def _at(x: float, y: float) -> dict[str, Any]:
 
 def _sizes(view: TableView) -> list[list[float]]:
     return [(s.extent * 1000).round().tolist() for s in view.segments]
+
+
+# What a thing rests on ------------------------------------------------------------------------------------------------
+
+
+def made_grid(height: np.ndarray, hidden: np.ndarray | None = None) -> HeightMap:
+    """A height map (X, Y) with the bare table wherever nothing stands and nothing hides it."""
+    occupied = height > 0
+    bare = ~occupied if hidden is None else ~occupied & ~hidden
+    rgb = np.full((*height.shape, 3), 128, np.uint8)
+    return HeightMap((0.1, -0.1), 0.002, height.astype(np.float32), rgb, occupied, bare)
+
+
+def sink() -> tuple[np.ndarray, np.ndarray]:
+    """Heights and labels of a tub (1: the rim, 2 and 3: two halves of its bottom) with a thing in its middle (4)."""
+    height, labels = np.full((100, 100), 0.12), np.ones((100, 100), np.int32)
+    for number, columns in ((2, slice(10, 50)), (3, slice(50, 90))):
+        height[10:90, columns], labels[10:90, columns] = 0.07, number
+    height[40:60, 35:65], labels[40:60, 35:65] = 0.10, 4
+    return height, labels
+
+
+def test_what_lies_across_two_regions_rests_at_their_height() -> None:
+    height, labels = sink()
+    level, below = find_supports(labels, made_grid(height))[4]
+    assert (level, below in (2, 3)) == (pytest.approx(0.07), True)
+
+
+def test_what_is_hidden_beside_a_thing_says_nothing_about_what_it_rests_on() -> None:
+    height, labels = sink()
+    hidden = np.zeros(height.shape, bool)
+    hidden[30:40, 30:70] = hidden[40:60, 65:75] = True  # the thing's shadow in the camera's eyes
+    height[hidden], labels[hidden] = 0.0, 0
+    assert find_supports(labels, made_grid(height, hidden))[4][0] == pytest.approx(0.07)
+    assert find_supports(labels, made_grid(height))[4] == (0.0, 0), "bare table there would say: it stands beside"
+
+
+def test_neither_a_bottom_nor_a_rim_rests_on_the_other() -> None:
+    height, labels = sink()
+    supports = find_supports(labels, made_grid(height))
+    assert [supports[region] for region in (1, 2, 3)] == [(0.0, 0)] * 3

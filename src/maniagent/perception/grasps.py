@@ -29,6 +29,8 @@ class GripperShape:
 
     max_opening: float = 0.048
     min_opening: float = 0.004
+    closed_gap: float = 0.0
+    """Between the pads of the closed fingers."""
     tip: float = 0.012
     """From the TCP to the fingertips, along the approach."""
     finger_thickness: float = 0.010
@@ -57,6 +59,9 @@ class GraspTuning:
     """m that the open fingers keep from the object on either side, at least."""
     spread: float = 0.010
     """m by which the fingers open further than that, where there is room."""
+    firm: float = 0.0
+    """m of width beyond the closed fingers' gap at which the grip is firm: springy fingers press the harder, the
+    further they are held apart."""
     min_overlap: float = 0.0045
     """m of pad that must reach below the object's top."""
     strip: float = 0.007
@@ -221,7 +226,12 @@ def _closes(found: _Candidates, gripper: GripperShape, tuning: GraspTuning) -> B
     """(N,) whether the cross-section fits between the pads, squarely and deep enough."""
     with np.errstate(invalid="ignore"):
         fits = found.width + 2 * tuning.finger_clearance <= gripper.max_opening
-        return fits & (found.width > 0) & (found.slope < tuning.friction) & (found.overlap >= tuning.min_overlap)
+        return (
+            fits
+            & (found.width > gripper.closed_gap)
+            & (found.slope < tuning.friction)
+            & (found.overlap >= tuning.min_overlap)
+        )
 
 
 def _with_room(found: _Candidates, grid: HeightMap, gripper: GripperShape, tuning: GraspTuning) -> _Candidates:
@@ -267,8 +277,12 @@ def _squareness(found: _Candidates, surface: FloatArray) -> FloatArray:
     return 1.0 - (difference - turned) / np.maximum((xx + yy) / 2 + difference, 1e-9)
 
 
-def _scores(found: _Candidates, surface: FloatArray, segment: Segment, gripper: GripperShape) -> FloatArray:
-    """(N,) in [0, 1]: square to the flanks, deep, near the middle (its weight turns it less), not at full stretch."""
+def _scores(
+    found: _Candidates, surface: FloatArray, segment: Segment, gripper: GripperShape, tuning: GraspTuning
+) -> FloatArray:
+    """(N,) in [0, 1]: square to the flanks, deep, near the middle (its weight turns it less), firm, not at
+    full stretch.
+    """
     length = max(float(segment.extent[0]), 0.02)
     off_centre = np.linalg.norm(found.origin - segment.centre[:2], axis=1) / (length / 2)
     depth = np.clip(found.overlap / min(0.02, max(float(segment.extent[2]), 0.005)), 0.0, 1.0)
@@ -277,7 +291,8 @@ def _scores(found: _Candidates, surface: FloatArray, segment: Segment, gripper: 
     # and fall alike, so that corners look square, too; but there the block is wider than across its sides.
     narrow = np.clip(float(segment.extent[1]) / np.maximum(found.width, 1e-3), 0.0, 1.0)
     square = _squareness(found, surface) * narrow**2 / (1.0 + found.slope**2)
-    return square * (0.4 + 0.6 * depth) * (1.0 - 0.7 * np.clip(off_centre, 0.0, 1.0)) * (0.8 + 0.2 * stretch)
+    firm = np.clip((found.width - gripper.closed_gap) / max(tuning.firm, 1e-6), 0.0, 1.0)
+    return firm * square * (0.4 + 0.6 * depth) * (1.0 - 0.7 * np.clip(off_centre, 0.0, 1.0)) * (0.8 + 0.2 * stretch)
 
 
 def _best(
@@ -285,7 +300,7 @@ def _best(
 ) -> tuple[GraspPose, ...]:
     """The best candidates, none within 12 mm and 25 degrees of a better one."""
     tcp = np.column_stack([found.origin, found.tip + gripper.tip])
-    score, opening = _scores(found, surface, segment, gripper), found.opening(gripper, tuning)
+    score, opening = _scores(found, surface, segment, gripper, tuning), found.opening(gripper, tuning)
     left = np.argsort(-score, kind="stable")
     kept: list[int] = []
     while len(left) and len(kept) < tuning.count:

@@ -37,6 +37,8 @@ class HeightMap:
     """(X, Y, 3) colour of the topmost surface; 0 where nothing stands."""
     occupied: BoolArray
     """(X, Y), True where something stands."""
+    bare: BoolArray
+    """(X, Y), True where the bare table is seen. What is neither is hidden."""
 
     def cells(self, points: NDArray[np.floating]) -> NDArray[np.intp]:
         """Rows and columns (..., 2) of points (..., 2 or 3), clipped to the grid."""
@@ -68,7 +70,7 @@ def build_height_map(views: Sequence[ViewPoints], workspace: Workspace, cell: fl
     )
     height = np.zeros(shape, np.float32)
     rgb = np.zeros((*shape, 3), np.uint8)
-    occupied = np.zeros(shape, bool)
+    occupied, bare = np.zeros(shape, bool), np.zeros(shape, bool)
     if views and sum(len(view.points) for view in views):
         points = np.concatenate([view.points for view in views])
         colours = np.concatenate([view.colours for view in views])
@@ -80,7 +82,11 @@ def build_height_map(views: Sequence[ViewPoints], workspace: Workspace, cell: fl
         topmost = heights == height.reshape(-1)[flat]
         rgb.reshape(-1, 3)[flat[topmost]] = colours[topmost]
         occupied.reshape(-1)[flat] = True
-    return _close_gaps(HeightMap(origin, cell, height, rgb, occupied))
+    for view in views:
+        index = ((view.bare - origin) / np.float32(cell)).astype(np.int32)
+        bare[np.clip(index[:, 0], 0, shape[0] - 1), np.clip(index[:, 1], 0, shape[1] - 1)] = True
+    bare = cv2.dilate(bare.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0  # the sample leaves cells out
+    return _close_gaps(HeightMap(origin, cell, height, rgb, occupied, bare & ~occupied))
 
 
 def _close_gaps(grid: HeightMap) -> HeightMap:
@@ -95,7 +101,7 @@ def _close_gaps(grid: HeightMap) -> HeightMap:
     rgb[gaps] = np.clip(cv2.blur(grid.rgb.astype(np.float32), window) * scale[..., None], 0, 255)[gaps]
     # One pixel's noise mustn't make a peak of the topmost surface.
     smooth = np.where(closed, cv2.medianBlur(height, 3), np.float32(0))
-    return HeightMap(grid.origin, grid.cell, smooth, rgb, closed)
+    return HeightMap(grid.origin, grid.cell, smooth, rgb, closed, grid.bare & ~closed)
 
 
 def _without_specks(grid: HeightMap) -> HeightMap:
@@ -104,4 +110,4 @@ def _without_specks(grid: HeightMap) -> HeightMap:
     large = stats[:, cv2.CC_STAT_AREA] >= MIN_ISLAND
     large[0] = False
     kept = large[islands]
-    return HeightMap(grid.origin, grid.cell, np.where(kept, grid.height, np.float32(0)), grid.rgb, kept)
+    return HeightMap(grid.origin, grid.cell, np.where(kept, grid.height, np.float32(0)), grid.rgb, kept, grid.bare)

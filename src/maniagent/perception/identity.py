@@ -16,14 +16,18 @@ from ..types import ObjectInfo
 MAX_COLOUR_DISTANCE = 40.0
 """CIE Lab distance (8-bit scale, lightness halved) between two looks at one thing, in light and in shade."""
 MAX_SIZE_RATIO = 1.6
-"""Between two estimates of one thing's length: part of it may be hidden."""
+"""Between two estimates of one thing's length, and of the side of a square as large: part of it may be hidden."""
 
 
 def same_thing(before: ObjectInfo, now: ObjectInfo) -> bool:
-    """Whether two objects look alike: by colour, and by the longer horizontal side."""
+    """Whether two objects look alike: by colour, by their longer horizontal side, and by their size from above."""
     colour = float(np.linalg.norm(_lab(before.colour) - _lab(now.colour)))
-    lengths = sorted((float(before.extent[0]), float(now.extent[0])))
-    return colour < MAX_COLOUR_DISTANCE and lengths[1] < MAX_SIZE_RATIO * max(lengths[0], 1e-3)
+    alike = colour < MAX_COLOUR_DISTANCE and _near(before.extent[0], now.extent[0])
+    return alike and _near(np.sqrt(before.extent[0] * before.extent[1]), np.sqrt(now.extent[0] * now.extent[1]))
+
+
+def _near(a: float, b: float) -> bool:
+    return bool(max(a, b) < MAX_SIZE_RATIO * max(min(a, b), 1e-3))
 
 
 def find_again(before: ObjectInfo, now: Sequence[ObjectInfo], within: float = np.inf) -> ObjectInfo | None:

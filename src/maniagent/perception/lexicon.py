@@ -30,7 +30,7 @@ from .phrases import Pick
 from .referring import Reference, read_reference
 from .segments import Segment
 from .viewpoint import Viewpoint
-from .vocabulary import ANYTHING, ColourWord, Noun, Vocabulary
+from .vocabulary import ANYTHING, ColourWord, Look, Noun, Vocabulary
 
 FLOOR = 0.45
 """Least score of what is accepted as meant."""
@@ -71,7 +71,7 @@ class Lexicon:
 
     def __init__(self, vocabulary: Vocabulary) -> None:
         self._vocabulary = vocabulary
-        self._choices = {choice for noun in vocabulary.nouns.values() for choice in noun.colours}
+        self._choices = set[str]().union(*(noun.colour_choices for noun in vocabulary.nouns.values()))
 
     @classmethod
     def load(cls, path: Path | None = None) -> Self:
@@ -194,14 +194,19 @@ def _membership(word: ColourWord, hue: FloatArray, saturation: FloatArray, light
     return np.min(parts, axis=0)
 
 
-def _fit(noun: Noun, look: Appearance) -> float:
-    """The worst fit of all that the noun asks for, in [0, 1]."""
-    sizes = ((noun.length, look.length), (noun.width, look.width), (noun.height, look.height), (noun.ratio, look.ratio))
+def _fit(noun: Noun, seen: Appearance) -> float:
+    """How well the best-fitting of the noun's looks fits, in [0, 1]."""
+    return max(_fit_look(look, seen) for look in noun.looks)
+
+
+def _fit_look(look: Look, seen: Appearance) -> float:
+    """The worst fit of all that the look asks for, in [0, 1]."""
+    sizes = ((look.length, seen.length), (look.width, seen.width), (look.height, seen.height), (look.ratio, seen.ratio))
     fits = [_in_range(value, limits, SIZE_SOFTNESS) for limits, value in sizes if limits is not None]
-    if noun.fill is not None:
-        fits.append(_in_share(look.fill, noun.fill))
-    for choice, limits in noun.colours.items():
-        fits.append(_in_share(look.shares[choice], limits))
+    if look.fill is not None:
+        fits.append(_in_share(seen.fill, look.fill))
+    for choice, limits in look.colours.items():
+        fits.append(_in_share(seen.shares[choice], limits))
     return min(fits, default=1.0)
 
 

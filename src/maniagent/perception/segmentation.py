@@ -125,21 +125,31 @@ def _fill_ridges(labels: Labels, occupied: BoolArray) -> Labels:
 def find_supports(labels: Labels, grid: HeightMap) -> Mapping[int, tuple[float, int]]:
     """By region: the height (m) it rests on, and which region that is (0: the table).
 
-    A region rests on another where most of its border is with that one, and higher than it.
+    A region rests on what most of its visible border is with, where it is higher than that; of several (the walls and
+    the bottom of a sink), on the one with the longest border, at the height of them all.
     """
     supports: dict[int, tuple[float, int]] = {}
     kernel = np.ones((7, 7), np.uint8)
     for label in np.unique(labels[labels > 0]):
         mask = labels == label
         ring = (cv2.dilate(mask.astype(np.uint8), kernel) > 0) & ~mask
-        neighbours, counts = np.unique(labels[ring], return_counts=True)
-        below, share = int(neighbours[counts.argmax()]), counts.max() / counts.sum()
+        occupied = ring & (labels > 0)
         supports[int(label)] = (0.0, 0)
-        if below > 0 and share > 0.6:
-            level = float(np.median(grid.height[ring & (labels == below)]))
-            if np.percentile(grid.height[mask], 90) > level + 0.004:
+        if np.count_nonzero(occupied) > 0.6 * np.count_nonzero(occupied | (ring & grid.bare)):
+            neighbours, counts = np.unique(labels[occupied], return_counts=True)
+            level = float(np.median(grid.height[occupied]))
+            below = int(neighbours[counts.argmax()])
+            middle, top = np.percentile(grid.height[mask], [50, 90])
+            # A basin isn't on its rim, whose height it reaches; nor is the rim on the basin.
+            higher = middle > level + 0.001 and top > level + 0.004
+            if higher and np.count_nonzero(mask) < _outline_area(labels == below):
                 supports[int(label)] = (level, below)
     return supports
+
+
+def _outline_area(mask: BoolArray) -> float:
+    """Cells within the convex outline of a region, what covers it included."""
+    return float(cv2.contourArea(cv2.convexHull(np.argwhere(mask).astype(np.int32))))
 
 
 def cut_segments(
@@ -153,7 +163,7 @@ def cut_segments(
         # What is seen below a region that rests on another is the other's flank.
         for label, (level, below) in supports.items():
             if below:
-                of_pixel[(of_pixel == label) & (view.points[:, 2] < level - 0.002)] = below
+                of_pixel[(of_pixel == label) & (view.points[:, 2] < level + 0.0015)] = below
         pixel_labels.append(of_pixel)
     all_points = np.concatenate([view.points for view in views])
     all_colours = np.concatenate([view.colours for view in views])

@@ -57,6 +57,8 @@ class ViewPoints:
     """(N, 3) m, base frame, z above the table plane."""
     colours: NDArray[np.uint8]
     """(N, 3) RGB."""
+    bare: NDArray[np.float32]
+    """(M, 2) m, base frame: where the bare table is seen, a sample of every other pixel."""
 
 
 def foreground(
@@ -98,9 +100,12 @@ def _view_foreground(
     coloured = _off_colour(frame.rgb, inside & (np.abs(height) < 0.004), tuning)
     pixels = np.flatnonzero(inside & ((height > tuning.height) | (coloured & (height > -tuning.height))))
     points = np.stack([x.ravel()[pixels], y.ravel()[pixels], height.ravel()[pixels]], axis=-1)
+    sample = (slice(None, None, 2), slice(None, None, 2))
+    on_table = inside[sample] & (np.abs(height[sample]) <= tuning.height) & ~coloured[sample]
+    bare = np.stack([x[sample][on_table], y[sample][on_table]], axis=-1)
     keep = ~covers_robot(points, robot)
     colours = frame.rgb.reshape(-1, 3)[pixels[keep]]
-    return ViewPoints(frame.name, frame.depth.shape, pixels[keep], points[keep], colours)
+    return ViewPoints(frame.name, frame.depth.shape, pixels[keep], points[keep], colours, bare)
 
 
 def _base_coordinates(frame: CameraFrame, depth: NDArray[np.float32]) -> NDArray[np.float32]:

@@ -44,8 +44,10 @@ class ColourWord(_Entry):
     """L*, 0 to 100."""
 
 
-class Noun(_Entry):
-    """How a kind of thing looks; what is None isn't restricted. The file itself explains the fields."""
+class Look(BaseModel):
+    """One way in which a kind of thing may look; what is None isn't restricted. The file itself explains the fields."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
 
     colours: Mapping[str, Range] = {}
     """Share of the visible surface, by "red" or "red or green"."""
@@ -55,7 +57,24 @@ class Noun(_Entry):
     height: Range | None = None
     ratio: Range | None = None
     fill: Range | None = None
+
+
+class Noun(Look, _Entry):
+    """How a kind of thing looks."""
+
+    also: tuple[Look, ...] = ()
+    """Other looks that it may have as well."""
     varies: tuple[Literal["colour", "size"], ...] = ()
+
+    @property
+    def looks(self) -> tuple[Look, ...]:
+        """All looks, the usual one first."""
+        return (self, *self.also)
+
+    @property
+    def colour_choices(self) -> set[str]:
+        """All of "red", "red or green" that any look speaks of."""
+        return {choice for look in self.looks for choice in look.colours}
 
 
 class Vocabulary(BaseModel):
@@ -71,7 +90,7 @@ class Vocabulary(BaseModel):
     @model_validator(mode="after")
     def _colours_are_known(self) -> Self:
         for name, noun in self.nouns.items():
-            for choice in noun.colours:
+            for choice in noun.colour_choices:
                 for colour in choice.split(" or "):
                     if colour not in self.colours:
                         raise ValueError(f"{name}: there is no colour {colour!r}")

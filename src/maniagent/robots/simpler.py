@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections.abc import Callable, Iterator, Sequence
 
 import numpy as np
@@ -11,7 +12,9 @@ from ..envs.simpler import FINGER_OFFSET, PERIOD, SimplerEnv
 from ..errors import FailureStage, MotionRejected
 from ..geometry import FloatArray, make_transform
 from ..motion import ArmModel, IKSolver, MotionLimits
+from ..perception.grasps import GraspTuning, GripperShape
 from ..perception.rig import Rig
+from ..perception.views import Tuning, Workspace
 from ..types import ExecutionReport, Gripper, KeyPoint, Observation, RobotState
 from .robot import Boxes
 from .simulated import BodyFilter
@@ -24,11 +27,24 @@ STEP_ANGLE = 0.35
 """rad per step."""
 ARRIVED = 0.006
 """m between the TCP and a key point at which it counts as reached."""
+LOST = 0.018
+"""m off a key point from which something must be in the way."""
+CLOSED_GAP = 0.0115
+"""m between the fingers up to which nothing is between them."""
 SETTLE_STEPS = 3
 CLOSE_STEPS = 3
 OPEN_STEPS = 2
+RAISED = 0.09
+"""m by which home is above the start pose, in which the gripper hides things from the camera."""
 HOME_STEPS = 12
 """Steps that must be left for the arm to go home: what doesn't fit into the budget isn't begun."""
+
+
+WORKSPACE = Workspace(x=(0.08, 0.50), y=(-0.30, 0.30))
+# The depth is exact. The colours of what is no object come from a photograph, which says nothing about the table.
+TUNING = Tuning(height=0.003, chroma=math.inf, brighter=math.inf, darker=0.0)
+GRIPPER = GripperShape(max_opening=0.052, min_opening=0.010, closed_gap=0.010, tip=0.0156)
+GRASPING = GraspTuning(friction=0.3, firm=0.012)
 
 
 class SimplerRobot:
@@ -42,10 +58,11 @@ class SimplerRobot:
         self._solver = IKSolver(self._model, self._limits.joint_margin)
         self._hooks: list[Callable[[str, float], None]] = []
         state = self.state()
-        self._home = state.T_base_tcp
+        self._home = state.T_base_tcp.copy()
+        self._home[2, 3] += RAISED
         self._commanded = state.T_base_tcp
         self._open = True
-        self.rig = Rig(BodyFilter(self._model))
+        self.rig = Rig(BodyFilter(self._model), WORKSPACE, TUNING, GRIPPER, GRASPING)
 
     def state(self) -> RobotState:
         """What the encoders say."""
@@ -74,30 +91,33 @@ class SimplerRobot:
             self.check(keypoints, boxes)
         except MotionRejected as rejection:
             return ExecutionReport(completed=False, reached=0, reason=str(rejection), stage=rejection.stage)
+        holds = False
         for reached, point in enumerate(keypoints):
             self._announce(point.description)
+            then = keypoints[reached + 1] if reached + 1 < len(keypoints) else None
             try:
-                off = self._go(point.T_base_tcp)
+                off = self._go(point.T_base_tcp, exactly=_must_be_reached(point, then))
                 self._grip(point.gripper)
             except _BudgetUsedUp:
                 why = f"The episode's {self._budget} steps are used up during {point.description!r}."
                 return ExecutionReport(completed=False, reached=reached, reason=why, stage=FailureStage.CONTROL)
-            if off > 3 * ARRIVED:
+            if off > LOST:
                 why = f"{point.description!r} ended {off * 1000:.0f} mm off: something is in the way."
                 return ExecutionReport(completed=False, reached=reached, reason=why, stage=FailureStage.CONTROL)
-            if point.gripper is Gripper.CLOSE and self.state().gripper_opening <= self._closed_gap():
+            holds = point.gripper is Gripper.CLOSE or (holds and point.gripper is not Gripper.OPEN)
+            if holds and self.state().gripper_opening <= CLOSED_GAP:
                 why = f"Nothing is held after {point.description!r}: the fingers closed all the way."
                 return ExecutionReport(completed=False, reached=reached, reason=why, stage=FailureStage.GRASP)
         return ExecutionReport(completed=True, reached=len(keypoints))
 
     def go_home(self) -> ExecutionReport:
-        """Straight up and to the start pose, where the budget allows; otherwise the arm stays where it is."""
+        """Straight up and over the start pose, where the budget allows; otherwise the arm stays where it is."""
         if self._budget - self._env.steps >= HOME_STEPS:
             up = self._commanded.copy()
             up[2, 3] = max(up[2, 3], self._home[2, 3])
             try:
                 for pose in (up, self._home):
-                    self._go(pose)
+                    self._go(pose, exactly=False)
             except _BudgetUsedUp:
                 why = "The episode's steps were used up on the way home."
                 return ExecutionReport(completed=False, reached=0, reason=why, stage=FailureStage.CONTROL)
@@ -119,13 +139,15 @@ class SimplerRobot:
         for hook in self._hooks:
             hook(description, 0.0)
 
-    def _closed_gap(self) -> float:
-        return 2 * (0.015 - FINGER_OFFSET) + 0.0015
+    def _go(self, T_base_goal: FloatArray, *, exactly: bool = True) -> float:
+        """Move on a straight line and, where asked, wait until the arm has caught up; returns how far off it ended, m.
 
-    def _go(self, T_base_goal: FloatArray) -> float:
-        """Move on a straight line, wait until the arm has caught up; returns how far off it ended, m."""
+        Where the arm needn't be exact, it isn't off.
+        """
         for T_base_next in waypoints(self._commanded, T_base_goal):
             self._command(T_base_next)
+        if not exactly:
+            return 0.0
         for _ in range(SETTLE_STEPS):
             off = float(np.linalg.norm(self.state().T_base_tcp[:3, 3] - T_base_goal[:3, 3]))
             if off < ARRIVED:
@@ -148,6 +170,12 @@ class SimplerRobot:
         turn = Rotation.from_matrix(T_base_next[:3, :3] @ self._commanded[:3, :3].T).as_euler("XYZ")
         self._env.step(np.array([*translation, *turn, 1.0 if self._open else -1.0]))
         self._commanded = T_base_next
+
+
+def _must_be_reached(point: KeyPoint, then: KeyPoint | None) -> bool:
+    """Whether the arm has to catch up at a key point: before the gripper acts, and before it goes down."""
+    goes_down = then is not None and then.T_base_tcp[2, 3] < point.T_base_tcp[2, 3] - 0.01
+    return goes_down or point.gripper is not Gripper.KEEP
 
 
 class _BudgetUsedUp(Exception):
