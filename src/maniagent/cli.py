@@ -9,6 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from . import __version__
+from .commands import simpler
 from .commands.common import ACHIEVED, NOT_ACHIEVED, WRONG_USE, Json, errors_told
 
 if TYPE_CHECKING:
@@ -24,6 +25,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="Start with [bold]maniagent doctor[/], then [bold]maniagent run --task carrot-on-plate[/].",
 )
+app.add_typer(simpler.app, name="simpler")
 
 
 def main() -> None:
@@ -94,7 +96,7 @@ def run(
 
 @app.command("eval")
 def evaluate(
-    suite: Annotated[str, typer.Argument(help="paper8, bridge, tabletop4, tabletop, or a single task.")],
+    suite: Annotated[str, typer.Argument(help="paper8, bridge, tabletop4, tabletop, simpler, or a single task.")],
     actor: Annotated[str, typer.Option(help="Who carries out the tasks.")] = "rules",
     episodes: Annotated[int, typer.Option(min=1, help="Episodes for each task and seed.")] = 24,
     seeds: Annotated[int, typer.Option(min=1, help="How many seeds; they count from 0.")] = 3,
@@ -109,6 +111,10 @@ def evaluate(
     record: Annotated[bool, typer.Option("--record/--no-record", help="Keep a run folder of every episode.")] = True,
     ray: Annotated[str | None, typer.Option(metavar="ADDRESS", help="Play on this Ray cluster (extra `ray`).")] = None,
     published: Annotated[bool, typer.Option("--published", help="Show published figures beside ours.")] = False,
+    poses: Annotated[
+        str | None, typer.Option(help="Where objects start in simpler: grid (its layouts) or off-grid.")
+    ] = None,
+    pose_seed: Annotated[int, typer.Option(min=0, help="Draws the poses off the grid.")] = 0,
     as_json: Json = False,
 ) -> None:
     """Play the tasks of a suite many times and say how often they succeed, with 95 % intervals.
@@ -122,9 +128,12 @@ def evaluate(
 
       maniagent eval carrot-on-plate --episodes 10 --seeds 1 --no-record --json | jq .average.success
 
+      maniagent eval simpler --episodes 200 --seeds 1 --poses off-grid --pose-seed 1
+
     Exit status: 0 when it ran to its end, whatever the success; 2 wrong use or missing set-up; 130 Ctrl-C.
     """
     with errors_told(as_json):
+        from .evaluation.poses import Poses
         from .evaluation.progress import EvaluationProgress
         from .evaluation.runner import evaluate as run_evaluation
 
@@ -133,6 +142,7 @@ def evaluate(
             summary = run_evaluation(
                 suite, out=folder, actor=actor, episodes=episodes, seeds=seeds, workers=workers, time_limit=time_limit,
                 record=record, ray=ray, published=published, watcher=progress,
+                poses=Poses(poses or "grid", pose_seed) if poses is not None or pose_seed else None,
             )  # fmt: skip
         _tell_evaluation(summary, as_json)
 

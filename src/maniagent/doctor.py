@@ -18,6 +18,7 @@ from pathlib import Path
 import numpy as np
 
 from .envs.rendering import OFFSCREEN, install_line, probe
+from .envs.simpler.assets import EXTRA, SETUP, asset_root, missing_files, missing_packages
 
 _OLDEST_PYTHON = (3, 11)
 _REINSTALL = "{python} -m pip install --force-reinstall --no-deps {package}"
@@ -43,7 +44,16 @@ def examine() -> tuple[Check, ...]:
         reasons = pool.map(probe, OFFSCREEN)
         tried = tuple(_tried(name, package, trial) for name, package, trial in _TRIALS)
         renderers = _renderers(dict(zip(OFFSCREEN, reasons, strict=True)))
-    return (_python(), *tried, *renderers, _writable(Path.cwd()), _screen(os.environ), _processors(), *_extras())
+    return (
+        _python(),
+        *tried,
+        *renderers,
+        _writable(Path.cwd()),
+        _screen(os.environ),
+        _processors(),
+        *_extras(),
+        _simpler(),
+    )
 
 
 def works(checks: Sequence[Check]) -> bool:
@@ -194,6 +204,16 @@ def _extra(name: str, requirements: Sequence[str]) -> Check:
         return Check(f"extra, {name}", True, "installed", needed=False)
     detail = f"missing {', '.join(missing)}"
     return Check(f"extra, {name}", False, detail, f"{sys.executable} -m pip install 'maniagent[{name}]'", needed=False)
+
+
+def _simpler() -> Check:
+    """Whether the benchmark's packages and assets are here; `maniagent simpler setup` tries whether they work."""
+    if packages := missing_packages():
+        return Check("SimplerEnv", False, f"missing {', '.join(packages)}", EXTRA, needed=False)
+    root = asset_root()
+    if missing_files(root):
+        return Check("SimplerEnv", False, f"assets missing in {root}", f"{SETUP} --assets {root}", needed=False)
+    return Check("SimplerEnv", True, f"assets in {root}", needed=False)
 
 
 def _installed(package: str) -> bool:

@@ -5,6 +5,7 @@ import os
 import sys
 import time
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import fakes
@@ -71,9 +72,9 @@ def test_what_is_finished_is_not_played_again(tmp_path: Path) -> None:
 
 
 @pytest.mark.slow
-def test_a_worker_is_replaced_before_it_grows_too_big(tmp_path: Path, monkeypatch: pytest.MonkeyPatch) -> None:
-    monkeypatch.setattr("maniagent.evaluation.workers._EPISODES_PER_PROCESS", 2)
-    summary = play(tmp_path, "who", episodes=6)
+def test_a_worker_is_replaced_before_it_grows_too_big(tmp_path: Path) -> None:
+    suite = replace(fakes.suite("who"), episodes_per_process=2)
+    summary = evaluate(suite, out=tmp_path, episodes=6, seeds=1, workers=2, time_limit=60.0)
     assert summary.finished == 6
     told = [json.loads(line)["reason"] for line in (tmp_path / RESULTS).read_bytes().splitlines()]
     assert all(told.count(process) <= 2 for process in told)
@@ -120,7 +121,7 @@ def test_unknown_names_suggest_the_nearest(tmp_path: Path) -> None:
 
 def test_suites_are_what_they_are_called() -> None:
     sizes = {name: len(suites.get(name).tasks) for name in suites.names()}
-    assert sizes == {"paper8": 8, "bridge": 4, "tabletop4": 4, "tabletop": 8}
+    assert sizes == {"paper8": 8, "bridge": 4, "tabletop4": 4, "tabletop": 8, "simpler": 4}
     assert suites.get("carrot-on-plate").tasks == ("carrot-on-plate",)
 
 

@@ -8,8 +8,13 @@ from typing import Annotated
 
 from pydantic import BaseModel, ConfigDict, Field
 
+from ..console.folder import OBSERVATIONS
+
 MOST_EPISODES = 10_000
 """Episodes per task and seed."""
+
+FINAL_PICTURE = f"{OBSERVATIONS}/final.png"
+"""In a run folder, where the suite leaves one: what the camera sees when everything is over."""
 
 CRASH, TIME_LIMIT = "crash", "time-limit"
 """Stages of failures that the actor never got to report: the episode broke off, or was stopped from outside."""
@@ -66,6 +71,8 @@ class EpisodeResult(BaseModel):
     model_calls: int = 0
     tokens: int = 0
     wall_seconds: float = 0.0
+    seconds: Mapping[str, float] = {}
+    """What the wall seconds went into: simulator, perception, reasoning ... other; empty where nobody took the time."""
     folder: str = ""
     """Run folder, relative to the evaluation's; empty where nothing was recorded."""
 

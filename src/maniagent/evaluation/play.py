@@ -30,8 +30,12 @@ class Play:
         folder = self.out / relative if self.out else None
         start = time.monotonic()
         result = self.suite.run_episode(job.task, job.seed, job.episode, self.actor, folder)
-        seconds = round(time.monotonic() - start, 2)
-        return result.model_copy(update={"wall_seconds": seconds, "folder": relative})
+        wall = time.monotonic() - start
+        parts = dict(result.seconds)
+        if parts:
+            parts["other"] = wall - sum(parts.values())
+        seconds = {name: round(spent, 3) for name, spent in parts.items()}
+        return result.model_copy(update={"wall_seconds": round(wall, 2), "seconds": seconds, "folder": relative})
 
 
 class Executor(Protocol):

@@ -15,9 +15,10 @@ from ..console.folder import REPORT
 from ..console.page import badge, text
 from ..console.story import read_story
 from ..errors import UsageError
+from .episode import FINAL_PICTURE
 from .statistics import Rate, Row
 from .summary import Failed, Summary
-from .tables import Table, interval, percent, published_table, result_table, stage_table
+from .tables import Table, interval, interval_note, percent, published_table, result_table, stage_table, time_table
 
 _THUMBNAIL = (320, 240)
 """px, at most."""
@@ -31,6 +32,7 @@ def render(summary: Summary) -> str:
         _header(summary),
         _headline(summary),
         _section("By task", _bars(summary) + _table(result_table(summary))),
+        _section("Wall time", _table(times)) if (times := time_table(summary)).rows else "",
         _section("Failures by stage", _table(stage_table(summary)) if summary.stages else '<p class="quiet">None.</p>'),
         _failed(summary),
         _section("Published figures", _published(summary)) if summary.published else "",
@@ -48,6 +50,7 @@ def _header(summary: Summary) -> str:
         "episodes per task": f"{settings.episodes} × {settings.seeds} seeds",
         "finished": f"{summary.finished} of {summary.total}",
         "version": settings.version,
+        **({"poses": settings.poses} if settings.poses else {}),
     }
     items = "".join(f"<div><dt>{text(name)}</dt><dd>{text(value)}</dd></div>" for name, value in facts.items())
     return (
@@ -68,9 +71,10 @@ def _headline(summary: Summary) -> str:
 
 
 def _rate_card(label: str, rate: Rate) -> str:
+    of = f"{rate.episodes} episodes" + (f" of {rate.scenes} scenes" if rate.scenes < rate.episodes else "")
     return (
         f'<div class="card"><p class="eyebrow">{text(label)}</p><p class="big">{percent(rate.value)}</p>'
-        f"<p>{interval(rate)} %, 95 % interval of {rate.episodes} episodes</p></div>"
+        f"<p>{interval(rate)} %, 95 % interval of {of}</p></div>"
     )
 
 
@@ -133,6 +137,7 @@ def _last_view(folder: Path, alt: str) -> str:
 
 def _views(folder: Path) -> Iterator[Path]:
     """The pictures of the main view, the last one first."""
+    yield folder / FINAL_PICTURE
     try:
         story = read_story(folder)
     except UsageError:
@@ -163,7 +168,8 @@ def _section(title: str, content: str) -> str:
 def _footer(summary: Summary) -> str:
     return (
         f"<footer><p>Written by maniagent {text(summary.settings.version)}. Success is the task’s own predicate on the "
-        "true state at the end of an episode, which the actor never sees. Intervals are Wilson’s, 95 %; that of the "
-        "average is over all episodes. Turns, steps and seconds are medians. Beside this page: summary.json, "
+        "true state at the end of an episode, which the actor never sees. "
+        f"{text(interval_note(summary))}; that of the average is over all episodes. "
+        "Turns, steps and seconds are medians. Beside this page: summary.json, "
         "summary.md, episodes.csv, results.jsonl.</p></footer>"
     )

@@ -30,6 +30,8 @@ class Settings(BaseModel):
     time_limit: float
     version: str
     """maniagent's."""
+    poses: str = ""
+    """How objects are placed, where the suite leaves that to choose."""
 
 
 class ResultsFile:

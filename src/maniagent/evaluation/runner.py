@@ -12,8 +12,9 @@ from .. import __version__
 from ..errors import UsageError
 from . import actors, report, suites, tables
 from .cluster import RayExecutor
-from .episode import MOST_EPISODES, EpisodeResult, Job
+from .episode import EpisodeResult, Job
 from .play import Executor, Play
+from .poses import Poses
 from .published import published as published_figures
 from .results import ResultsFile, Settings
 from .suites import Suite
@@ -49,6 +50,7 @@ def evaluate(
     record: bool = True,
     ray: str | None = None,
     published: bool = False,
+    poses: Poses | None = None,
     watcher: Watcher | None = None,
 ) -> Summary:
     """Play every task of a suite `episodes` x `seeds` times and say how often it succeeds.
@@ -56,18 +58,23 @@ def evaluate(
     Every finished episode is kept in `out` at once, and an evaluation that was interrupted, however roughly, goes on
     there when it is called again. `workers` episodes are played at a time, each in another process (on a Ray cluster
     where `ray` gives an address) and for `time_limit` seconds of wall time at most. With `record` every episode leaves
-    a run folder. Scripts that call this need `if __name__ == "__main__":`.
+    a run folder. `poses` says how objects are placed, for suites that leave that to choose. Scripts that call this need
+    `if __name__ == "__main__":`.
 
     Raises
     ------
     UsageError
         For an unknown name, a number that makes no sense, or a folder that holds something else.
     SetupError
-        Where no episode can be played: nothing renders, or Ray is missing.
+        Where no episode can be played: nothing renders, or something that the suite needs is missing.
 
     """
     chosen = suites.get(suite) if isinstance(suite, str) else suite
-    _check(episodes, seeds, workers, time_limit)
+    if poses is not None:
+        chosen = suites.placed(chosen, poses)
+    _check(chosen, episodes, seeds, workers, time_limit)
+    if ray is None:
+        chosen.ready()
     settings = Settings(
         suite=chosen.name,
         tasks=chosen.tasks,
@@ -76,6 +83,7 @@ def evaluate(
         seeds=seeds,
         time_limit=time_limit,
         version=__version__,
+        poses=str(chosen.poses or ""),
     )
     folder = Path(out).resolve()  # workers elsewhere may have another working directory
     figures = published_figures() if published else ()
@@ -96,12 +104,14 @@ def evaluate(
     return summary
 
 
-def _check(episodes: int, seeds: int, workers: int, time_limit: float) -> None:
+def _check(suite: Suite, episodes: int, seeds: int, workers: int, time_limit: float) -> None:
     for name, number in (("episodes", episodes), ("seeds", seeds), ("workers", workers)):
         if number < 1:
             raise UsageError(f"The number of {name} is {number}; it should be 1 or more.")
-    if episodes > MOST_EPISODES:
-        raise UsageError(f"The number of episodes is {episodes}; it should be {MOST_EPISODES} or less. Use more seeds.")
+    if episodes > suite.episodes:
+        on_grid = suite.poses is not None and suite.poses.on_grid
+        more = "There are more off the grid: --poses off-grid." if on_grid else "Use more seeds."
+        raise UsageError(f"The number of episodes is {episodes}; it should be {suite.episodes} or less. {more}")
     if not time_limit > 0:
         raise UsageError(f"The time limit is {time_limit} s; it should be more than 0.")
 

@@ -71,7 +71,7 @@ def summarise(
 ) -> Summary:
     """Put the finished episodes together."""
     results = sorted(results, key=lambda result: (suite.tasks.index(result.task), result.seed, result.episode))
-    per_task = rows(results, suite.tasks)
+    per_task = rows(results, suite.tasks, suite.seeds_draw_scenes)
     return Summary(
         settings=settings,
         out=out,

@@ -47,6 +47,7 @@ def _outcome_columns(summary: Summary) -> Columns:
         "95 % interval": lambda row: interval(row.success),
         **{f"{name} %": _by_criterion(name) for name in criteria},
         "verdict right %": lambda row: _rate(row.agreement),
+        "same each time %": lambda row: _percent(row.repeats_agree),
     }
 
 
@@ -65,6 +66,15 @@ def _by_row(summary: Summary, columns: Columns) -> Table:
     cells = {name: [text(row) for row in summary.everything] for name, text in columns.items()}
     filled = {name: texts for name, texts in cells.items() if any(texts)}
     return Table(tuple(filled), tuple(zip(*filled.values(), strict=True)))
+
+
+def time_table(summary: Summary) -> Table:
+    """What the wall time goes into; no rows where nobody took the time."""
+    kinds = dict.fromkeys(name for row in summary.rows for name in row.shares)
+    shares: Columns = {f"{name} %": _by_share(name) for name in kinds}
+    task: Columns = {"task": lambda row: row.task}
+    pace: Columns = {"episodes/min, 1 worker": lambda row: _number(row.per_minute)}
+    return _by_row(summary, {**task, **pace, **shares}) if kinds else Table((), ())
 
 
 def stage_table(summary: Summary) -> Table:
@@ -94,10 +104,12 @@ def markdown(summary: Summary) -> str:
     parts = [
         f"# {settings.suite}, {settings.actor}",
         f"{summary.finished} of {summary.total} episodes: {settings.episodes} for each task and seed, seeds 0 to "
-        f"{settings.seeds - 1}. maniagent {settings.version}. Medians of turns, steps and seconds; Wilson 95 % "
-        "intervals; the average weighs every task the same.",
+        f"{settings.seeds - 1}{f'; poses: {settings.poses}' if settings.poses else ''}. maniagent {settings.version}. "
+        f"Medians of turns, steps and seconds; {interval_note(summary)}; the average weighs every task the same.",
         _markdown_table(result_table(summary)),
     ]
+    if (times := time_table(summary)).rows:
+        parts += ["## Wall time", _markdown_table(times)]
     if summary.stages:
         parts += ["## Failures by stage", _markdown_table(stage_table(summary))]
     if summary.failed:
@@ -125,6 +137,12 @@ def episodes_csv(results: Iterable[EpisodeResult]) -> str:
     return text.getvalue()
 
 
+def interval_note(summary: Summary) -> str:
+    """What the intervals are."""
+    repeated = summary.average is not None and summary.average.success.scenes < summary.average.success.episodes
+    return "Wilson 95 % intervals" + (", which count a scene once however often it was played" if repeated else "")
+
+
 def percent(share: float) -> str:
     """A share as percent with one decimal."""
     return f"{100 * share:.1f} %"
@@ -135,12 +153,20 @@ def interval(rate: Rate) -> str:
     return f"{100 * rate.low:.1f}–{100 * rate.high:.1f}"
 
 
+def _by_share(name: str) -> Callable[[Row], str]:
+    return lambda row: _percent(row.shares.get(name, 0.0))
+
+
 def _by_criterion(name: str) -> Callable[[Row], str]:
     return lambda row: _rate(row.criteria.get(name))
 
 
 def _rate(rate: Rate | None) -> str:
     return "" if rate is None else f"{100 * rate.value:.1f}"
+
+
+def _percent(share: float | None) -> str:
+    return "" if share is None else f"{100 * share:.1f}"
 
 
 def _number(value: float | None) -> str:

@@ -21,9 +21,6 @@ from .play import Play
 _START_LIMIT = 180.0
 """Seconds that a worker may take to start, imports included."""
 
-_EPISODES_PER_PROCESS = 25
-"""After so many a worker is replaced: simulators and renderers keep some megabytes of every episode."""
-
 
 class LocalExecutor:
     """Plays jobs in `workers` processes of this machine, each episode for `time_limit` seconds at most.
@@ -70,6 +67,7 @@ class _Worker:
     def __init__(self, play: Play, log: Path | None) -> None:
         context = multiprocessing.get_context("spawn")
         self.connection, theirs = context.Pipe()
+        self._most = play.suite.episodes_per_process
         self._process = context.Process(target=_serve, args=(theirs, play, log), daemon=True)
         self._process.start()
         theirs.close()  # so that its death shows as the end of the connection
@@ -111,7 +109,7 @@ class _Worker:
         if not isinstance(answer, EpisodeResult):
             raise answer
         self._played += 1
-        if self._played >= _EPISODES_PER_PROCESS:
+        if self._played >= self._most:
             self.kill()
         return answer
 

@@ -51,7 +51,8 @@ class SimplerEnv:
         self.task = task
         self._env = _make(bridge.base_env.BaseBridgeEnv, task.env_id, self._torch.cuda.is_available())
         self._layouts = self._env.xyz_configs, self._env.quat_configs
-        self._film: Film | None = None
+        self.film: Film | None = None
+        """Is shown a picture at the start of an episode and after every second step, as long as it is set."""
         self.seconds: defaultdict[str, float] = defaultdict(float)
         """Wall seconds of the episode so far, by what they went into: reset, step, render, film."""
         self.info: dict[str, bool] = {}
@@ -75,15 +76,12 @@ class SimplerEnv:
         positions, quaternions = (np.asarray(values.cpu(), float) for values in self._layouts)
         return positions, quaternions
 
-    def reset(self, start: int | Start, film: Film | None = None) -> None:
-        """Start an episode with one of the benchmark's layouts, or with the objects somewhere else.
-
-        `film` is shown a picture at the start and after every second step.
-        """
+    def reset(self, start: int | Start) -> None:
+        """Start an episode with one of the benchmark's layouts, or with the objects somewhere else."""
         if isinstance(start, int) and not 0 <= start < LAYOUTS:
             raise UsageError(f"SimplerEnv has layouts 0 to {LAYOUTS - 1}, not {start}.")
         self.seconds.clear()
-        self.info, self.history, self._film = {}, [], film
+        self.info, self.history = {}, []
         with self._timed("reset"):
             self._place(start)
             layout = start if isinstance(start, int) else 0
@@ -122,8 +120,7 @@ class SimplerEnv:
 
     def picture(self) -> NDArray[np.uint8]:
         """What the camera sees now, (480, 640, 3); for people who look at episodes."""
-        with self._timed("film"):
-            return np.asarray(self._render()["sensor_data"][CAMERA]["rgb"][0].cpu())
+        return np.asarray(self._render()["sensor_data"][CAMERA]["rgb"][0].cpu())
 
     def close(self) -> None:
         """Free the renderer."""
@@ -139,8 +136,9 @@ class SimplerEnv:
             )
 
     def _shoot(self) -> None:
-        if self._film is not None and self.steps % _STEPS_PER_FRAME == 0:
-            self._film(self.picture(), self.steps * PERIOD)
+        if self.film is not None and self.steps % _STEPS_PER_FRAME == 0:
+            with self._timed("film"):
+                self.film(self.picture(), self.steps * PERIOD)
 
     def _render(self) -> Any:
         # Rendering costs five times what a step does: it is on only while a picture is taken. There is no setter.
