@@ -86,3 +86,13 @@ def test_a_named_object_carries_all_measurements() -> None:
     np.testing.assert_array_equal(thing.centre, made.centre)
     np.testing.assert_array_equal(thing.extent, made.extent)
     assert (thing.yaw, thing.surface_z, thing.free_spot) == (made.yaw, made.surface_z, None)
+
+
+@given(ANGLES, st.floats(0.03, 0.2))
+def test_a_round_thing_points_nowhere_and_is_as_wide_as_it_is(angle: float, diameter: float) -> None:
+    x, y = np.meshgrid(*[np.linspace(-diameter / 2, diameter / 2, 61)] * 2)
+    within = np.hypot(x, y) <= diameter / 2
+    disc = np.column_stack([x[within], y[within], np.full(within.sum(), 0.02)])
+    seen = segment(disc @ rotation_z(angle).T)
+    assert min(abs(seen.yaw), abs(abs(seen.yaw) - np.pi / 2)) < 1e-9
+    np.testing.assert_allclose(seen.extent[:2], diameter, rtol=0.06)

@@ -13,6 +13,10 @@ from numpy.typing import NDArray
 from ..geometry import FloatArray, wrap_angle
 from ..types import BoolArray, GraspPose, ObjectInfo
 
+ROUND_FILL, ROUND_RATIO = 0.85, 1.1
+"""A footprint is round where its hull fills less of its rectangle (a disc fills 0.79, an octagon 0.83), and length
+and width differ less."""
+
 
 @dataclass(frozen=True)
 class _Footprint:
@@ -41,16 +45,12 @@ class Segment:
 
     @cached_property
     def _footprint(self) -> _Footprint:
-        # The rectangle's sides are cut a little inside the extremes: one stray depth pixel mustn't stretch it.
         xy = self.points[:, :2].astype(np.float32)
-        yaw = float(np.radians(cv2.minAreaRect(xy)[2]))
-        axes = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])  # rows: along, across
-        low, high = np.percentile(xy @ axes.T, [0.2, 99.8], axis=0)
-        length, width = map(float, high - low)
-        centre = (low + high) / 2 @ axes
-        if width > length:
-            length, width, yaw = width, length, yaw + np.pi / 2
-        return _Footprint(centre, length, width, wrap_angle(yaw, np.pi))
+        found = _rectangle(xy, float(np.radians(cv2.minAreaRect(xy)[2])))
+        area = float(cv2.contourArea(cv2.convexHull(xy)))
+        # Which way a disc's smallest rectangle lies is chance, and its corners are not the disc's.
+        is_round = found.length < ROUND_RATIO * found.width and area < ROUND_FILL * found.length * found.width
+        return _rectangle(xy, 0.0) if is_round else found
 
     @cached_property
     def top_z(self) -> float:
@@ -59,7 +59,7 @@ class Segment:
 
     @property
     def yaw(self) -> float:
-        """Direction of the longer horizontal side, rad in (-pi/2, pi/2]."""
+        """Direction of the longer horizontal side, rad in (-pi/2, pi/2]; along or across base x for a round thing."""
         return self._footprint.yaw
 
     @cached_property
@@ -91,3 +91,17 @@ class Segment:
         return ObjectInfo(
             index, name, self.centre, self.extent, self.yaw, self.surface_z, self.colour, grasps, self.free_spot
         )
+
+
+def _rectangle(xy: NDArray[np.float32], yaw: float) -> _Footprint:
+    """The rectangle, one side of which points along `yaw`, around points (N, 2).
+
+    Its sides are cut a little inside the extremes: one stray depth pixel mustn't stretch it.
+    """
+    axes = np.array([[np.cos(yaw), np.sin(yaw)], [-np.sin(yaw), np.cos(yaw)]])  # rows: along, across
+    low, high = np.percentile(xy @ axes.T, [0.2, 99.8], axis=0)
+    length, width = map(float, high - low)
+    centre = (low + high) / 2 @ axes
+    if width > length:
+        length, width, yaw = width, length, yaw + np.pi / 2
+    return _Footprint(centre, length, width, wrap_angle(yaw, np.pi))
