@@ -330,6 +330,15 @@ def test_where_all_movements_were_made_and_it_failed_the_detector_is_asked_anew(
     assert len(detector.queries) == 2 * sought
 
 
+def test_a_thing_nobody_asked_for_goes_by_the_name_it_had_before() -> None:
+    agents, *_ = made({"objects": [{"reason": "", "number": 2}]})
+    first = agents.objects.locate(MIDDLE, look("middle-pepper"), Memory())
+    plate = MIDDLE.model_copy(update={"text": "push the plate", "objects": ("plate",)})
+    others = agents.objects.locate(plate, look("middle-pepper"), remembering("x", objects=first.objects)).surroundings
+    names = [thing.name.split(" at (")[0] for thing in sorted(others, key=lambda thing: float(thing.centre[1]))]
+    assert names == ["thing", *["what looks like the middle red pepper"] * 2]  # the two red ones are alike
+
+
 def test_a_plate_is_dragged_by_the_side_towards_which_it_goes() -> None:
     agents, *_ = made({}, task="drag-plate")
     for x, y in ((0.2, 0.2), (0.2, -0.2)):

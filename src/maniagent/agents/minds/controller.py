@@ -13,7 +13,7 @@ from .answers import Written
 from .eyes import Eyes
 from .prompts import Prompt
 from .steps import to_sequence
-from .telling import fenced, one_line, tell_objects
+from .telling import fenced, one_line, tell_frame, tell_objects
 
 
 class MindControllerAgent:
@@ -31,6 +31,7 @@ class MindControllerAgent:
         instructions, question = self._prompt.filled(
             subtask=fenced(subtask.text, 500),
             objects=tell_objects(objects),
+            frame=tell_frame(viewpoint),
             feedback=self._tell(subtask, feedback) if feedback else "",
         )
 

@@ -12,6 +12,7 @@ from ...geometry import FloatArray
 from ...models.question import ChatModel, Picture, Question, Unfit
 from ...perception.detectors.pictures import draw_marks
 from ...perception.detectors.protocol import Match
+from ...perception.identity import same_thing
 from ...perception.rig import Rig
 from ...perception.segmentation import TableView
 from ...perception.segments import Segment
@@ -65,7 +66,7 @@ class MindObjectAgent:
         grasps = offer_grasps(subtask.objects[0], moved, view, self._rig, attempts, way)
         chosen = [(q, match.segment, match.detection) for q, match in zip(subtask.objects, found, strict=True)]
         others = [s for s in view.segments if not any(_covers(match.segment, s) for match in found)]
-        return assemble(chosen, grasps, [(_unnamed(s), s) for s in others])
+        return assemble(chosen, grasps, [(_name_of(s, memory), s) for s in others])
 
     def _find_again(
         self, queries: Sequence[str], attempts: Sequence[SubtaskRecord], view: TableView, observation: Observation
@@ -155,6 +156,10 @@ def _covers(whole: Segment, part: Segment) -> bool:
     return float(np.linalg.norm(whole.centre - part.centre)) < 0.01
 
 
-def _unnamed(segment: Segment) -> str:
-    x, y, _ = segment.centre
-    return f"thing at ({x:.2f}, {y:.2f})"
+def _name_of(segment: Segment, memory: Memory) -> str:
+    """For a thing that nobody asked for now: what a thing of its looks was called before, and where it is."""
+    seen = segment.to_object(0, "thing")
+    before = (thing for record in reversed(memory.records) for thing in record.objects if same_thing(thing, seen))
+    known = next(before, None)
+    name = "thing" if known is None else f"what looks like the {known.name}"
+    return f"{name} at ({seen.centre[0]:.2f}, {seen.centre[1]:.2f})"

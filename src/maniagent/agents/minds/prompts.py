@@ -17,9 +17,9 @@ from ...errors import UsageError
 
 PLACEHOLDERS: Mapping[str, frozenset[str]] = {
     "scene": frozenset({"instruction", "names"}),
-    "reasoning": frozenset({"instruction", "scene", "memory", "notice", "opening"}),
+    "reasoning": frozenset({"instruction", "scene", "memory", "notice", "opening", "frame"}),
     "alikes": frozenset({"query", "subtask", "count"}),
-    "controller": frozenset({"subtask", "objects", "feedback"}),
+    "controller": frozenset({"subtask", "objects", "feedback", "frame"}),
 }
 """By prompt: what is filled in; every one must be in the file, and no other."""
 MAX_LENGTH = 20_000

@@ -14,7 +14,7 @@ from .eyes import Eyes
 from .loops import notice, refuse_loop
 from .prompts import Prompt
 from .scene import names_in
-from .telling import fenced, one_line, plain, tell_memory
+from .telling import fenced, one_line, plain, tell_frame, tell_memory
 
 MEASURED = "The positions in the scene are all that can be measured: answer act, done or cannot."
 _VERDICTS = {"success": Verdict.SUCCESS, "failure": Verdict.FAILURE, "none": Verdict.INITIAL}
@@ -45,6 +45,7 @@ class MindReasoningAgent:
             scene=fenced(scene.text, 8000),
             memory=tell_memory(memory.records, self._eyes.follow(last) if last is not None else ""),
             notice=notice(memory.records) if may_measure else MEASURED,
+            frame=tell_frame(self._eyes.viewpoint),
             opening=f"{self._opening * 100:.1f}",
         )
 

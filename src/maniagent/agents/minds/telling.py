@@ -6,6 +6,9 @@ import re
 import unicodedata
 from collections.abc import Sequence
 
+import numpy as np
+
+from ...perception.viewpoint import Viewpoint
 from ...types import ObjectInfo, SubtaskRecord, Verdict
 
 MOST_REMEMBERED = 12
@@ -28,6 +31,12 @@ def one_line(text: str, limit: int = 200) -> str:
 def plain(name: str) -> str:
     """The form in which two names are the same: lower case, single spaces, no article, no quotes."""
     return _ARTICLE.sub("", " ".join(name.casefold().strip(" .\"'`").split()))
+
+
+def tell_frame(viewpoint: Viewpoint) -> str:
+    """How the viewer's directions lie in the robot's frame, in which coordinates are given."""
+    right, away = (f"({x + 0.0:.2g}, {y + 0.0:.2g})" for x, y in np.round([viewpoint.right, viewpoint.away], 2))
+    return f"Coordinates are metres in the robot's frame; there the viewer's right is {right}, away is {away}."
 
 
 def tell_objects(objects: Sequence[ObjectInfo]) -> str:
