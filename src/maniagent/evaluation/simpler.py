@@ -33,7 +33,7 @@ def run_episode(
 ) -> EpisodeResult:
     """Play one episode: layout `episode`, or the start that `poses` draws for it.
 
-    It is always played on for HORIZON steps, with the arm at rest once the actor is through; the true state of each
+    It is always played on for HORIZON steps, with the arm at rest once the actor is through; the true state after each
     step tells all measures of success. `seed` changes nothing by itself: physics and pictures repeat exactly.
     """
     start = time.monotonic()
@@ -43,30 +43,33 @@ def run_episode(
     with ExitStack() as stack:
         recorder = None if out is None else _Timed(stack.enter_context(Recorder(out)))
         log = EventLog([tally] if recorder is None else [recorder, tally])
-        layout = episode if poses.on_grid else draw_start(*env.layouts, poses.generator(task, episode))
         env.film = None if recorder is None else lambda rgb, now: log.emit("frame", rgb=rgb, robot_time=now)
-        env.reset(layout)
+        env.reset(episode if poses.on_grid else draw_start(*env.layouts, poses.generator(task, episode)))
         robot = SimplerRobot(env, HORIZON)
         agents = actors.get(actor).make_agents(robot.rig)
         log.emit("run_started", instruction=env.instruction, task=task, seed=seed, agents=agents.name)
         before = dict(env.seconds)
         result = AgentLoop(robot, agents, log).run(env.instruction)
-        steps = env.steps
         spent |= _shares(result, before, env.seconds)
-        env.film = None  # from here on nothing moves
+        steps = env.steps
+        env.film = None  # from here on the arm stands still
         robot.rest()
-        success = strict.last(env.history, env.task.steps)
         if out is not None:
             _save(env.picture(), out / FINAL_PICTURE)
-        log.emit("run_finished", result=result, achieved=success)
+        log.emit("run_finished", result=result, achieved=strict.last(env.history, env.task.steps))
     spent["simulator"] = sum(env.seconds[name] for name in ("reset", "step", "render"))
     if recorder is not None:
         spent["recording"] = recorder.seconds + env.seconds["film"]
-    late = strict.last(env.history, HORIZON)
+    return _judged(Job(task, seed, episode), env, result, tally, steps).model_copy(update={"seconds": spent})
+
+
+def _judged(job: Job, env: SimplerEnv, result: RunResult, tally: Tally, steps: int) -> EpisodeResult:
+    """What became of an episode of HORIZON steps, of which the actor used `steps`."""
+    success, late = (strict.last(env.history, budget) for budget in (env.task.steps, HORIZON))
     return EpisodeResult(
-        task=task,
-        seed=seed,
-        episode=episode,
+        task=job.task,
+        seed=job.seed,
+        episode=job.episode,
         success=success,
         criteria=strict.criteria(env.history, env.task.steps),
         believed=result.verdict is RunVerdict.ACHIEVED,
@@ -76,7 +79,6 @@ def run_episode(
         turns=tally.turns,
         steps=steps,
         robot_seconds=round(steps * PERIOD, 2),
-        seconds=spent,
     )
 
 

@@ -32,30 +32,33 @@ def draw_start(positions: FloatArray, quaternions: FloatArray, rng: np.random.Ge
     by a uniform angle. What no layout ever moves (the eggplant's basket) stays where and as it is.
     """
     apart = np.linalg.norm(positions[:, 0, :2] - positions[:, 1, :2], axis=1).min()
+    areas = [_Area(positions[:, i]) for i in range(2)]
     attitude = quaternions[rng.integers(len(quaternions))]
-    turned = np.stack([_turn(q, rng) if _moves(positions[:, i]) else q for i, q in enumerate(attitude)])
+    turned = np.stack([_turn(q, rng) if area.edges is not None else q for area, q in zip(areas, attitude, strict=True)])
     for _ in range(_TRIES):
-        drawn = np.stack([_point_within(positions[:, i], rng) for i in range(2)])
+        drawn = np.stack([area.draw(rng) for area in areas])
         if np.linalg.norm(drawn[0, :2] - drawn[1, :2]) >= apart:
             return Start(drawn, turned)
     raise ValueError(f"no two points of the layouts' areas were {apart:.3f} m apart in {_TRIES} draws")
 
 
-def _moves(positions: FloatArray) -> bool:
-    return bool(np.ptp(positions, axis=0).max() > 0)
+class _Area:
+    """The convex hull in the plane of where the layouts have an object; one point where they never move it."""
 
+    def __init__(self, positions: FloatArray) -> None:
+        """From (P, 3) positions."""
+        self._low, self._high = positions.min(axis=0), positions.max(axis=0)
+        plane = positions[:, :2].astype(float)
+        moves = np.ptp(positions, axis=0).max() > 0
+        self.edges: FloatArray | None = ConvexHull(plane).equations if moves else None
+        """(E, 3) outward normal and offset of each edge; None for a point."""
 
-def _point_within(positions: FloatArray, rng: np.random.Generator) -> FloatArray:
-    """A point (3,) uniform over the convex hull of positions (P, 3) in the plane, at their mean height."""
-    if not _moves(positions):
-        return positions[0].copy()
-    plane = positions[:, :2].astype(float)
-    edges = ConvexHull(plane).equations  # outward normal and offset of each edge
-    low, high = plane.min(axis=0), plane.max(axis=0)
-    while True:
-        point = rng.uniform(low, high)
-        if np.all(edges[:, :2] @ point + edges[:, 2] <= 1e-12):
-            return np.array([*point, positions[:, 2].mean()])
+    def draw(self, rng: np.random.Generator) -> FloatArray:
+        """A point (3,), uniform over the area."""
+        while True:
+            point = rng.uniform(self._low, self._high)
+            if self.edges is None or np.all(self.edges[:, :2] @ point[:2] + self.edges[:, 2] <= 1e-12):
+                return point
 
 
 def _turn(quaternion: FloatArray, rng: np.random.Generator) -> FloatArray:
