@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from . import __version__
-from .commands import models, simpler
+from .commands import cache, models, simpler
 from .commands.common import ACHIEVED, NOT_ACHIEVED, WRONG_USE, Json, errors_told
 
 if TYPE_CHECKING:
@@ -25,6 +25,7 @@ app = typer.Typer(
     context_settings={"help_option_names": ["-h", "--help"]},
     epilog="Start with [bold]maniagent doctor[/], then [bold]maniagent run --task carrot-on-plate[/].",
 )
+app.add_typer(cache.app, name="cache")
 app.add_typer(models.app, name="models")
 app.add_typer(simpler.app, name="simpler")
 
