@@ -9,7 +9,7 @@ fingers, knuckles or palm go. The same test finds a grasp across a carrot and on
 from __future__ import annotations
 
 from collections.abc import Sequence
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import numpy as np
 from numpy.typing import NDArray
@@ -29,6 +29,7 @@ class GripperShape:
 
     max_opening: float = 0.048
     min_opening: float = 0.004
+    """To which the fingers open at least: `max_opening` where they are open or closed and nothing between."""
     closed_gap: float = 0.0
     """Between the pads of the closed fingers."""
     tip: float = 0.012
@@ -88,8 +89,10 @@ def propose_grasps(
     centres = _spread_out(surface, tuning.centres)
     found = _sections(centres, surface, segment, gripper, tuning)
     found = found.take(_closes(found, gripper, tuning))
-    found = _with_room(found, grid, gripper, tuning)
-    return _best(found, surface, segment, gripper, tuning)
+    roomy = _with_room(found, grid, gripper, tuning)
+    if not len(roomy.tip):  # beside a wall one finger goes close to the object, and pushes it to the other
+        roomy = _with_room(found.moved_aside(gripper, tuning), grid, gripper, tuning)
+    return _best(roomy, surface, segment, gripper, tuning)
 
 
 @dataclass(frozen=True)
@@ -126,7 +129,14 @@ class _Candidates:
 
     def opening(self, gripper: GripperShape, tuning: GraspTuning) -> FloatArray:
         """(N,) m, how far the fingers are opened on the way down."""
-        return np.minimum(self.width + 2 * (tuning.finger_clearance + tuning.spread), gripper.max_opening)
+        wanted = self.width + 2 * (tuning.finger_clearance + tuning.spread)
+        return np.clip(wanted, gripper.min_opening, gripper.max_opening)
+
+    def moved_aside(self, gripper: GripperShape, tuning: GraspTuning) -> _Candidates:
+        """The same with the hand as far to either side as the open fingers still pass the object."""
+        slack = (self.opening(gripper, tuning) - self.width) / 2 - tuning.finger_clearance
+        aside = np.maximum(slack, 0.0)[:, None] * self.axes[1]
+        return _Candidates.concatenate([replace(self, origin=self.origin + side) for side in (aside, -aside)])
 
 
 def _surface(segment: Segment, grid: HeightMap) -> FloatArray:
@@ -312,7 +322,7 @@ def _best(
     return tuple(
         GraspPose(
             make_transform(top_down_rotation(_upright_yaw(found.yaw[i], tcp[i])), tcp[i]),
-            float(max(opening[i], gripper.min_opening)),
+            float(opening[i]),
             float(score[i]),
         )
         for i in kept

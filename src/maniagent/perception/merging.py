@@ -78,7 +78,7 @@ def _end_to_end(border: Border) -> bool:
         return False
     if border.length * border.cell > 3.0 * width:
         return False
-    return all(rectangle(part.cells, border.cell)[1] < 1.15 * width for part in (border.small, border.large))
+    return all(rectangle(part.cells, border.cell)[1] < 1.25 * width for part in (border.small, border.large))
 
 
 _RULES: tuple[Callable[[Border], bool], ...] = (

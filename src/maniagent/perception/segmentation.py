@@ -137,7 +137,8 @@ def find_supports(labels: Labels, grid: HeightMap) -> Mapping[int, tuple[float, 
         supports[int(label)] = (0.0, 0)
         if np.count_nonzero(occupied) > 0.6 * np.count_nonzero(occupied | (ring & grid.bare)):
             neighbours, counts = np.unique(labels[occupied], return_counts=True)
-            level = float(np.median(grid.height[occupied]))
+            # The lower part: beside it may stand a wall.
+            level = float(np.percentile(grid.height[occupied], 25))
             below = int(neighbours[counts.argmax()])
             middle, top = np.percentile(grid.height[mask], [50, 90])
             # A basin isn't on its rim, whose height it reaches; nor is the rim on the basin.

@@ -43,7 +43,7 @@ HOME_STEPS = 12
 WORKSPACE = Workspace(x=(0.08, 0.50), y=(-0.30, 0.30))
 # The depth is exact. The colours of what is no object come from a photograph, which says nothing about the table.
 TUNING = Tuning(height=0.003, chroma=math.inf, brighter=math.inf, darker=0.0)
-GRIPPER = GripperShape(max_opening=0.052, min_opening=0.010, closed_gap=0.010, tip=0.0156)
+GRIPPER = GripperShape(max_opening=0.052, min_opening=0.052, closed_gap=0.010, tip=0.0156)
 GRASPING = GraspTuning(friction=0.3, firm=0.012)
 
 

@@ -29,7 +29,7 @@ class Florence2:
 
     def __init__(self, where: str) -> None:
         """Load from a folder or a Hub id; SetupError where that fails."""
-        self._loaded: Pretrained = load_pretrained("Florence2ForConditionalGeneration", where)
+        self._loaded: Pretrained = load_pretrained("florence2", "Florence2ForConditionalGeneration", where)
 
     def boxes(self, phrase: str, rgb: NDArray[np.uint8]) -> Iterable[tuple[Box, float]]:
         """See `BoxModel`."""

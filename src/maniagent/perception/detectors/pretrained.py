@@ -75,28 +75,39 @@ class Pretrained:
         return self.processor(images=Image.fromarray(rgb), text=text, return_tensors="pt", **options).to(self.device)
 
 
-def load_pretrained(model_class: str, where: str) -> Pretrained:
-    """Load weights by a transformers class's name from a folder or a Hub id; on the GPU where there is one.
+def load_pretrained(architecture: str, model_class: str, where: str) -> Pretrained:
+    """Load an architecture (a `model_type` of transformers) from a folder or a Hub id; on the GPU where there is one.
 
-    Raises SetupError where the extra is not installed, or the weights are not there and can't be fetched.
+    Raises SetupError where the extra is not installed, where the weights are not there and can't be fetched, and
+    where what is there is another architecture, damaged or not complete.
     """
     try:
         import torch
         import transformers
+        from safetensors import SafetensorError
     except ImportError as error:
         raise SetupError(
             f"This detector needs torch and transformers ({error}). Install them with: "
             "pip install 'maniagent[detectors]'"
         ) from error
-    device = "cuda" if torch.cuda.is_available() else "cpu"
     try:
+        found = transformers.AutoConfig.from_pretrained(where).model_type
+        if found != architecture:
+            raise SetupError(f"The weights in {where!r} are those of a {found!r}; {architecture!r} is wanted.")
         processor = transformers.AutoProcessor.from_pretrained(where)
         # Checkpoints in half precision would crawl on a CPU, and boxes are no better for it on a GPU.
-        model = getattr(transformers, model_class).from_pretrained(where, dtype=torch.float32)
-    except (OSError, ValueError) as error:
-        reason = str(error).strip().splitlines()[0] if str(error).strip() else type(error).__name__
+        model, report = getattr(transformers, model_class).from_pretrained(
+            where, dtype=torch.float32, output_loading_info=True
+        )
+    except (OSError, ValueError, SafetensorError) as error:
+        reason = next(iter(str(error).strip().splitlines()), type(error).__name__)
         raise SetupError(
             f"The detector's weights can't be loaded from {where!r}: {reason} Give NAME:FOLDER with a folder that "
             "`save_pretrained` wrote, or NAME:ID with a Hugging Face id that this machine can reach."
         ) from error
+    if missing := report["missing_keys"]:  # they would be random numbers, and so would the boxes
+        raise SetupError(
+            f"The weights in {where!r} are not complete: {len(missing)} are missing, {min(missing)!r} first."
+        )
+    device = "cuda" if torch.cuda.is_available() else "cpu"
     return Pretrained(torch, processor, model.to(device).eval(), device)

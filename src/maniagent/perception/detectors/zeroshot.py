@@ -16,6 +16,8 @@ from .protocol import Box
 class Family:
     """What differs from one architecture to the next."""
 
+    architecture: str
+    """As transformers calls it."""
     default: str
     """Hub id."""
     threshold: float
@@ -26,8 +28,8 @@ class Family:
     """The text must be as long as the model's longest."""
 
 
-GROUNDING_DINO = Family("IDEA-Research/grounding-dino-base", 0.25, ".", padded=False)
-OWLV2 = Family("google/owlv2-base-patch16-ensemble", 0.1, "", padded=True)
+GROUNDING_DINO = Family("grounding-dino", "IDEA-Research/grounding-dino-base", 0.25, ".", padded=False)
+OWLV2 = Family("owlv2", "google/owlv2-base-patch16-ensemble", 0.1, "", padded=True)
 
 
 class ZeroShot:
@@ -36,7 +38,7 @@ class ZeroShot:
     def __init__(self, family: Family, where: str) -> None:
         """Load from a folder or a Hub id; SetupError where that fails."""
         self._family = family
-        self._loaded: Pretrained = load_pretrained("AutoModelForZeroShotObjectDetection", where)
+        self._loaded: Pretrained = load_pretrained(family.architecture, "AutoModelForZeroShotObjectDetection", where)
 
     def boxes(self, phrase: str, rgb: NDArray[np.uint8]) -> Iterable[tuple[Box, float]]:
         """See `BoxModel`."""
