@@ -7,6 +7,7 @@ import sys
 from pathlib import Path
 
 import pytest
+import typer
 import yaml
 from typer.testing import CliRunner
 
@@ -15,7 +16,19 @@ from maniagent.tasks import Task, names
 
 ROOT = Path(__file__).parents[1]
 DOCUMENTS = [ROOT / name for name in ("README.md", "CONTRIBUTING.md", "CHANGELOG.md")] + sorted(ROOT.glob("docs/*.md"))
-COMMANDS = {command.name or command.callback.__name__ for command in app.registered_commands if command.callback}
+ROOT_COMMAND = typer.main.get_command(app)
+
+
+def command_of(words: list[str]) -> list[str]:
+    """The command among the words, sub-commands included; empty where there is none."""
+    path: list[str] = []
+    group = ROOT_COMMAND
+    for word in words:
+        group = getattr(group, "commands", {}).get(word)
+        if group is None:
+            break
+        path.append(word)
+    return path
 
 
 def blocks(path: Path, language: str) -> list[str]:
@@ -45,8 +58,9 @@ def test_commands_and_options_that_are_named_exist(path: Path) -> None:
     told = [shlex.split(line, comments=True) for line in re.findall(r"^\$ (?:\S*/)?maniagent (.*)$", text, re.M)]
     told += [re.sub(r"[\[\]\"]", "", line).split() for line in re.findall(r"`maniagent ([^`]*)`", text)]
     for words in told:
-        assert words[0] in COMMANDS, words
-        usage = CliRunner().invoke(app, [words[0], "--help"], env={"COLUMNS": "200"}).stdout
+        command = command_of(words)
+        assert command, words
+        usage = CliRunner().invoke(app, [*command, "--help"], env={"COLUMNS": "200"}).stdout
         assert all(word in usage for word in words if word.startswith("--")), words
         if "--task" in words and (task := words[words.index("--task") + 1]) != "NAME":
             assert task in names()

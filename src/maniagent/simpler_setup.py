@@ -12,6 +12,7 @@ from .doctor import Check
 from .envs.simpler.assets import DOWNLOADS, EXTRA, asset_root, missing_files, missing_packages
 from .errors import SetupError
 
+_DOWNLOADER = "mani_skill.utils.download_asset"
 _TRIAL_LIMIT = 180.0
 """s; the first picture of a fresh driver takes some ten seconds."""
 _RENDERER = (
@@ -65,7 +66,7 @@ def _fetch(root: Path) -> None:
 
 
 def _download(name: str, root: Path) -> None:
-    command = [sys.executable, "-m", "mani_skill.utils.download_asset", name, "--quiet", "--non-interactive"]
+    command = [sys.executable, "-m", _DOWNLOADER, name, "--quiet", "--non-interactive"]
     done = subprocess.run(  # noqa: S603 - our own command
         command, env=_environment(root), capture_output=True, text=True, check=False
     )
@@ -73,7 +74,7 @@ def _download(name: str, root: Path) -> None:
         why = done.stderr.strip().splitlines()[-1:] or ["no reason given"]
         raise SetupError(
             f"ManiSkill could not download {name!r}: {why[0]} Fetch it where the network is open "
-            f"(python -m mani_skill.utils.download_asset {name}), copy it, and run this with --assets."
+            f"(python -m {_DOWNLOADER} {name}), copy it, and run this with --assets."
         )
 
 

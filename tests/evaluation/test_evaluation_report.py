@@ -10,7 +10,7 @@ import pytest
 from PIL import Image
 
 from maniagent.evaluation import report, tables
-from maniagent.evaluation.episode import EpisodeResult, Job, lost
+from maniagent.evaluation.episode import FINAL_PICTURE, EpisodeResult, Job, lost
 from maniagent.evaluation.published import published
 from maniagent.evaluation.results import Settings
 from maniagent.evaluation.summary import Summary, summarise
@@ -64,6 +64,26 @@ def test_a_failed_episode_shows_its_last_view_and_leads_to_its_report(reader: Re
     assert (image["width"], image["height"], image["alt"]) == ("320", "240", "Last view of lose-s0-e000")
     assert str(image["src"]).startswith("data:image/jpeg;base64,")
     assert "episodes/lose-s0-e000/report.html" in [link["href"] for link in reader.all("a")]
+
+
+def test_the_picture_of_the_end_comes_before_the_last_look(tmp_path: Path) -> None:
+    failed = lost(Job("lose", 0, 0), "grasp", "it slipped")
+    folder = run_folder(tmp_path, failed.job)
+    Image.fromarray(np.full((90, 160, 3), 200, np.uint8)).save(tmp_path / folder / FINAL_PICTURE)
+    page = Reader(report.render(summary(tmp_path, failed.model_copy(update={"folder": folder}))))
+    (image,) = page.all("img")
+    assert (image["width"], image["height"]) == ("160", "90")
+
+
+def test_wall_time_is_told_by_what_it_went_into(tmp_path: Path) -> None:
+    timed = EpisodeResult(
+        task="win", seed=0, episode=0, success=True, wall_seconds=4.0, seconds={"simulator": 3.0, "other": 1.0}
+    )  # fmt: skip
+    told = summary(tmp_path, timed)
+    assert "Wall time" in Reader(report.render(told)).text
+    assert "| win | 15 | 75.0 | 25.0 |" in tables.markdown(told)
+    assert told.to_plain()["average"]["shares"] == {"simulator": 0.75, "other": 0.25}
+    assert not tables.time_table(summary(tmp_path)).rows
 
 
 def test_nothing_that_was_said_becomes_markup_and_nothing_is_fetched(reader: Reader) -> None:

@@ -104,3 +104,29 @@ def test_stages_count_failed_episodes_and_all_failures_on_the_way() -> None:
 def test_nothing_gives_no_rows_and_no_average() -> None:
     assert rows([], ("a",)) == ()
     assert average((), []) is None
+
+
+def test_a_scene_that_is_repeated_counts_once_in_the_interval() -> None:
+    results = [result("a", k, k > 0).model_copy(update={"seed": seed}) for k in range(4) for seed in range(3)]
+    (row,) = rows(results, ("a",), seeds_draw_scenes=False)
+    assert (row.success.value, row.success.episodes, row.success.scenes) == (0.75, 12, 4)
+    assert (row.success.low, row.success.high) == wilson(3, 4)
+    assert row.repeats_agree == 1.0
+    whole = average((row,), results)
+    assert whole is not None
+    assert whole.success.scenes == 4
+    assert whole.repeats_agree == 1.0
+
+
+def test_repetitions_that_differ_are_told() -> None:
+    results = [result("a", 0, True), result("a", 0, False).model_copy(update={"seed": 1}), result("a", 1, True)]
+    (row,) = rows(results, ("a",), seeds_draw_scenes=False)
+    assert row.repeats_agree == 0.0
+
+
+def test_shares_are_of_the_time_that_somebody_took() -> None:
+    timed = {"simulator": 3.0, "perception": 1.0}
+    results = [result("a", 0, True, seconds=timed, wall_seconds=4.0), result("a", 1, True, wall_seconds=2.0)]
+    (row,) = rows(results, ("a",))
+    assert row.shares == {"simulator": 0.75, "perception": 0.25}
+    assert row.per_minute == 20.0
