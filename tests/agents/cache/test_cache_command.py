@@ -36,7 +36,7 @@ def exported(cache: Path) -> dict[str, Any]:
 def test_list_says_what_was_learned_and_how_it_went(cache: Path) -> None:
     text = call("list", "--cache", cache).stdout
     assert re.search(r"1 +text +put the carrot on the plate +pick-and-place +1 of 2", text)
-    assert re.search(r"2 +form +put {0} on {1} ", text)
+    assert re.search(r"2 +form +put \{0\} on \{1\} ", text)
     assert "\x1b" not in text
     listed = json.loads(call("list", "--cache", cache, "--json").stdout)
     assert [(entry["id"], entry["kind"], entry["successes"], entry["failures"]) for entry in listed] == [
