@@ -13,16 +13,16 @@ from numpy.typing import NDArray
 from .agents.events import EventLog, Observer
 from .agents.loop import AgentLoop
 from .agents.protocols import Agents
-from .agents.rules import rules_agents
 from .console.recorder import Recorder
+from .crew import Crew, MakeAgents, RulesCrew
 from .envs.tabletop import TabletopEnv
 from .errors import UsageError
-from .perception.rig import Rig
 from .robots.robot import Robot
 from .robots.simulated import SimulatedRobot
 from .tasks import Task, get, load_task
 from .types import RunResult, RunVerdict
 
+RULES = RulesCrew()
 REST_SECONDS = 1.0
 """Robot time between the arm's coming home and the verdict on true state: whatever rolls has come to rest."""
 
@@ -49,9 +49,10 @@ def run(
     out: str | Path | None = None,
     view: bool = False,
     observers: Sequence[Observer] = (),
-    agents: Callable[[Rig], Agents] = rules_agents,
+    crew: Crew = RULES,
+    agents: MakeAgents | None = None,
 ) -> RunOutcome:
-    """Carry out an instruction in the tabletop twin, with the `rules` agents where `agents` makes no others.
+    """Carry out an instruction in the tabletop twin, with `crew`'s agents, or with those that `agents` makes.
 
     Give a task by name, or a scene file (docs/scenes.md). Without an instruction the task's own is carried out.
     `seed` draws the layout and the sensors' noise: the same seed gives the same run. With `out` the run leaves a
@@ -60,9 +61,9 @@ def run(
     Raises
     ------
     UsageError
-        For an unknown task, a bad scene file, a negative seed, or nothing to do.
+        For an unknown task, a bad scene file, a negative seed, or nothing to do; for a crew that is named wrongly.
     SetupError
-        Where nothing renders offscreen.
+        Where nothing renders offscreen, or something that the crew needs is missing.
 
     """
     if seed < 0:
@@ -86,7 +87,8 @@ def run(
             env.settle(REST_SECONDS)
             return episode.achieved(env.truth())
 
-        result, achieved = _carry_out(robot, agents(robot.rig), said, name, seed, log, achieved_now)
+        make = stack.enter_context(crew.ready(log, folder)) if agents is None else agents
+        result, achieved = _carry_out(robot, make(robot.rig), said, name, seed, log, achieved_now)
     return RunOutcome(name, seed, said, result, achieved, folder)
 
 

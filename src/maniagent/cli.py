@@ -11,6 +11,16 @@ import typer
 from . import __version__
 from .commands import cache, models, simpler
 from .commands.common import ACHIEVED, NOT_ACHIEVED, WRONG_USE, Json, errors_told
+from .commands.crew import (
+    ActorOption,
+    BaseUrl,
+    CacheOption,
+    DetectorOption,
+    Llm,
+    PromptsOption,
+    Vlm,
+    crew_from,
+)
 
 if TYPE_CHECKING:
     from .app import RunOutcome
@@ -63,6 +73,13 @@ def run(
         typer.Option(help="Run folder; an earlier run in it is replaced.", show_default="runs/TIME-TASK-sSEED"),
     ] = None,
     view: Annotated[bool, typer.Option("--view", help="Open a window and watch; needs a screen.")] = False,
+    actor: ActorOption = None,
+    vlm: Vlm = None,
+    llm: Llm = None,
+    base_url: BaseUrl = None,
+    detector: DetectorOption = None,
+    prompts: PromptsOption = None,
+    cache_file: CacheOption = None,
     as_json: Json = False,
 ) -> None:
     """Carry out one instruction in simulation, from camera images alone.
@@ -74,6 +91,8 @@ def run(
       maniagent run --task spoon-on-towel --seed 7 --out runs/spoon
 
       maniagent run "put the spoon on the towel" --scene kitchen.yaml
+
+      maniagent run --task hungry --vlm openai:gpt-5 --llm anthropic:claude-sonnet-4-5
 
       maniagent run --task green-on-yellow --json | jq .achieved
 
@@ -87,10 +106,13 @@ def run(
         from .console.folder import default_folder
         from .console.progress import Progress
 
+        crew = crew_from(
+            actor, vlm=vlm, llm=llm, base_url=base_url, detector=detector, prompts=prompts, cache=cache_file
+        )
         folder = out or default_folder(task or (scene.stem if scene else None), seed)
         with Progress() as progress:
             outcome = run_app(
-                instruction, task=task, scene=scene, seed=seed, out=folder, view=view, observers=(progress,)
+                instruction, task=task, scene=scene, seed=seed, out=folder, view=view, observers=(progress,), crew=crew
             )
         _tell_outcome(outcome, as_json)
         raise typer.Exit(_status(outcome))
@@ -99,7 +121,6 @@ def run(
 @app.command("eval")
 def evaluate(
     suite: Annotated[str, typer.Argument(help="paper8, bridge, tabletop4, tabletop, simpler, or a single task.")],
-    actor: Annotated[str, typer.Option(help="Who carries out the tasks.")] = "rules",
     episodes: Annotated[int, typer.Option(min=1, help="Episodes for each task and seed.")] = 24,
     seeds: Annotated[int, typer.Option(min=1, help="How many seeds; they count from 0.")] = 3,
     workers: Annotated[int, typer.Option(min=1, help="Episodes that are played at a time.")] = 1,
@@ -117,6 +138,13 @@ def evaluate(
         str | None, typer.Option(help="Where objects start in simpler: grid (its layouts) or off-grid.")
     ] = None,
     pose_seed: Annotated[int, typer.Option(min=0, help="Draws the poses off the grid.")] = 0,
+    actor: ActorOption = None,
+    vlm: Vlm = None,
+    llm: Llm = None,
+    base_url: BaseUrl = None,
+    detector: DetectorOption = None,
+    prompts: PromptsOption = None,
+    cache_file: CacheOption = None,
     as_json: Json = False,
 ) -> None:
     """Play the tasks of a suite many times and say how often they succeed, with 95 % intervals.
@@ -130,6 +158,8 @@ def evaluate(
 
       maniagent eval carrot-on-plate --episodes 10 --seeds 1 --no-record --json | jq .average.success
 
+      maniagent eval paper8 --vlm openai:gpt-5 --episodes 5 --seeds 1 --time-limit 900
+
       maniagent eval simpler --episodes 200 --seeds 1 --poses off-grid --pose-seed 1
 
     Exit status: 0 when it ran to its end, whatever the success; 2 wrong use or missing set-up; 130 Ctrl-C.
@@ -139,11 +169,14 @@ def evaluate(
         from .evaluation.progress import EvaluationProgress
         from .evaluation.runner import evaluate as run_evaluation
 
-        folder = out or Path("runs") / f"eval-{suite}-{actor}"
+        crew = crew_from(
+            actor, vlm=vlm, llm=llm, base_url=base_url, detector=detector, prompts=prompts, cache=cache_file
+        )
+        folder = out or Path("runs") / f"eval-{suite}-{crew.name.split()[0]}"
         with EvaluationProgress() as progress:
             summary = run_evaluation(
-                suite, out=folder, actor=actor, episodes=episodes, seeds=seeds, workers=workers, time_limit=time_limit,
-                record=record, ray=ray, published=published, watcher=progress,
+                suite, out=folder, actor=crew.name, episodes=episodes, seeds=seeds, workers=workers,
+                time_limit=time_limit, record=record, ray=ray, published=published, watcher=progress,
                 poses=Poses(poses or "grid", pose_seed) if poses is not None or pose_seed else None,
             )  # fmt: skip
         _tell_evaluation(summary, as_json)

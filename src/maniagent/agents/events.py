@@ -10,6 +10,7 @@ Kinds of events and their data:
 | described | turn, scene |
 | reasoned | turn, subtask |
 | located | turn, objects, detections |
+| asked | turn, role, model, tokens_in, tokens_out, seconds, repairs, error: an exchange with a language model |
 | cache | turn, found ("text", "form" or ""), sequence (the one that was served, or None) |
 | checked | turn, keypoints, reason (why the robot refused them, or empty) |
 | planned | turn, sequence, keypoints |

@@ -8,11 +8,13 @@ import shutil
 from pathlib import Path
 
 from ..errors import UsageError
+from ..models.record import EXCHANGES, PICTURES
 
 EVENTS, VIDEO, SUMMARY, REPORT = "events.jsonl", "video.mp4", "summary.json", "report.html"
 OBSERVATIONS, DETECTIONS, SEQUENCES = "observations", "detections", "sequences"
+_MODELS = (EXCHANGES, PICTURES)  # what models were asked, and the pictures that they were shown
 _VIDEO_PART = "video.part"  # stands there for the blink of an eye while the video gets its index
-_OURS = frozenset({EVENTS, VIDEO, SUMMARY, REPORT, OBSERVATIONS, DETECTIONS, SEQUENCES, _VIDEO_PART})
+_OURS = frozenset({EVENTS, VIDEO, SUMMARY, REPORT, OBSERVATIONS, DETECTIONS, SEQUENCES, *_MODELS, _VIDEO_PART})
 
 
 def default_folder(name: str | None, seed: int, now: datetime.datetime | None = None) -> Path:

@@ -9,8 +9,9 @@ from pathlib import Path
 from typing import Protocol
 
 from .. import __version__
+from ..crew import crew_of
 from ..errors import UsageError
-from . import actors, report, suites, tables
+from . import report, suites, tables
 from .cluster import RayExecutor
 from .episode import EpisodeResult, Job
 from .play import Executor, Play
@@ -78,7 +79,7 @@ def evaluate(
     settings = Settings(
         suite=chosen.name,
         tasks=chosen.tasks,
-        actor=actors.get(actor).name,
+        actor=crew_of(actor).name,
         episodes=episodes,
         seeds=seeds,
         time_limit=time_limit,
@@ -94,7 +95,7 @@ def evaluate(
             watcher.begin(chosen.name, len(jobs), results.done)
         try:
             if pending := [job for job in jobs if job not in finished]:
-                play = Play(chosen, actor, folder if record else None)
+                play = Play(chosen, settings.actor, folder if record else None)
                 local: Executor = LocalExecutor(play, workers, time_limit, folder / WORKERS_LOG)
                 executor = local if ray is None else RayExecutor(play, workers, time_limit, ray)
                 _play(executor, pending, results, watcher)

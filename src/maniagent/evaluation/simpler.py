@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import shlex
 import time
 from collections.abc import Mapping
 from contextlib import ExitStack
@@ -15,14 +16,15 @@ from PIL import Image
 from ..agents.events import EventLog
 from ..agents.loop import AgentLoop
 from ..console.recorder import Recorder
+from ..crew import crew_of
 from ..envs.simpler import HORIZON, PERIOD, TASKS, SimplerEnv, draw_start
 from ..errors import UnknownNameError
 from ..robots.simpler import SimplerRobot
 from ..types import Event, RunResult, RunVerdict
-from . import actors, strict
+from . import strict
 from .episode import FINAL_PICTURE, EpisodeResult, Job
 from .poses import ON_GRID, Poses
-from .tally import Tally, seconds_by_kind
+from .tally import Tally
 
 LATE = "late"
 """Stage of a failure that is a success at the last of all steps, after the registered budget."""
@@ -46,11 +48,11 @@ def run_episode(
         env.film = None if recorder is None else lambda rgb, now: log.emit("frame", rgb=rgb, robot_time=now)
         env.reset(episode if poses.on_grid else draw_start(*env.layouts, poses.generator(task, episode)))
         robot = SimplerRobot(env, HORIZON)
-        agents = actors.get(actor).make_agents(robot.rig)
+        agents = stack.enter_context(crew_of(actor).ready(log, out))(robot.rig)
         log.emit("run_started", instruction=env.instruction, task=task, seed=seed, agents=agents.name)
         before = dict(env.seconds)
         result = AgentLoop(robot, agents, log).run(env.instruction)
-        spent |= _shares(result, before, env.seconds)
+        spent |= _shares(tally.seconds_by_kind(result), before, env.seconds)
         steps = env.steps
         env.film = None  # from here on the arm stands still
         robot.rest()
@@ -77,6 +79,8 @@ def _judged(job: Job, env: SimplerEnv, result: RunResult, tally: Tally, steps: i
         reason=result.reason,
         failed_turns=dict(tally.failed_turns),
         turns=tally.turns,
+        model_calls=tally.model_calls,
+        tokens=tally.tokens,
         steps=steps,
         robot_seconds=round(steps * PERIOD, 2),
     )
@@ -91,13 +95,13 @@ def play(
     """
     if task not in TASKS:
         raise UnknownNameError("SimplerEnv task", task, TASKS)
-    actors.get(actor)
+    crew_of(actor)
     return run_episode(task, 0, episode, actor, out, poses)
 
 
 def repeat(job: Job, actor: str, poses: Poses = ON_GRID) -> str:
     """The command that plays the episode again, with a run folder."""
-    who = "" if actor == "rules" else f" --actor {actor}"
+    who = "" if actor == "rules" else f" --actor {shlex.quote(actor)}"
     return f"maniagent simpler play {job.task} --episode {job.episode}{poses.options}{who}"
 
 
@@ -107,13 +111,12 @@ def _environment(task: str) -> SimplerEnv:
     return SimplerEnv(TASKS[task])
 
 
-def _shares(result: RunResult, before: Mapping[str, float], after: Mapping[str, float]) -> dict[str, float]:
+def _shares(kinds: dict[str, float], before: Mapping[str, float], after: Mapping[str, float]) -> dict[str, float]:
     """The run's wall seconds without what of them the simulator and the film took."""
 
     def taken(name: str) -> float:
         return after.get(name, 0.0) - before.get(name, 0.0)
 
-    kinds = seconds_by_kind(result)
     observing, executing = kinds.pop("observe"), kinds.pop("execution")
     kinds["perception"] += observing - taken("render")
     return {**kinds, "control": executing - taken("step") - taken("film")}

@@ -2,13 +2,14 @@
 
 from __future__ import annotations
 
+import shlex
 from pathlib import Path
 
 from ..app import run
+from ..crew import crew_of
 from ..types import RunVerdict
-from . import actors
 from .episode import EpisodeResult, Job, scene_seed
-from .tally import Tally, seconds_by_kind
+from .tally import Tally
 
 
 def run_episode(task: str, seed: int, episode: int, actor: str, out: Path | None) -> EpisodeResult:
@@ -19,7 +20,7 @@ def run_episode(task: str, seed: int, episode: int, actor: str, out: Path | None
         seed=scene_seed(seed, episode),
         out=out,
         observers=(tally,),
-        agents=actors.get(actor).make_agents,
+        crew=crew_of(actor),
     )
     return EpisodeResult(
         task=task,
@@ -32,12 +33,15 @@ def run_episode(task: str, seed: int, episode: int, actor: str, out: Path | None
         failed_turns=dict(tally.failed_turns),
         turns=tally.turns,
         robot_seconds=round(tally.robot_seconds, 2),
-        seconds=seconds_by_kind(outcome.result),
+        model_calls=tally.model_calls,
+        tokens=tally.tokens,
+        seconds=tally.seconds_by_kind(outcome.result),
     )
 
 
 def repeat(job: Job, actor: str) -> str:
     """The command that plays the episode again."""
     if actor != "rules":
-        return f"maniagent eval {job.task} --actor {actor} --episodes {job.episode + 1} --seeds {job.seed + 1}"
+        who = f"--actor {shlex.quote(actor)}"
+        return f"maniagent eval {job.task} {who} --episodes {job.episode + 1} --seeds {job.seed + 1}"
     return f"maniagent run --task {job.task} --seed {scene_seed(job.seed, job.episode)}"

@@ -8,16 +8,24 @@ from ..types import Event, RunResult, RunVerdict
 
 UNNOTICED = "unnoticed"
 """Stage of a failure that the agents took for a success."""
+THINKING = "models"
+"""The kind of work that language models do."""
+_ROLES = {"scene": "perception", "objects": "perception", "reasoning": "reasoning", "controller": "reasoning"}
+"""By the role that asks a model: the kind of work whose seconds the answer takes."""
 
 
 class Tally:
-    """An Observer that counts turns and failures."""
+    """An Observer that counts turns, failures, and what is asked of models."""
 
     def __init__(self) -> None:
         self.turns = 0
         self.failed_turns: Counter[str] = Counter()
         self.last_failure = ""
         """Stage of the last failure; empty where there was none."""
+        self.model_calls = 0
+        self.tokens = 0
+        """Read and written by models."""
+        self._waited: Counter[str] = Counter()  # s, for models, by kind of work
         self._first_look: float | None = None
         self._last_look = 0.0
 
@@ -34,6 +42,10 @@ class Tally:
                 self._last_look = event.data["observation"].robot.time
                 if self._first_look is None:
                     self._first_look = self._last_look
+            case "asked":
+                self.model_calls += 1
+                self.tokens += event.data["tokens_in"] + event.data["tokens_out"]
+                self._waited[_ROLES.get(event.data["role"], "reasoning")] += event.data["seconds"]
             case "failed":
                 self.last_failure = event.data["stage"] or "execution"
                 self.failed_turns[self.last_failure] += 1
@@ -43,6 +55,14 @@ class Tally:
         if result.verdict is RunVerdict.ACHIEVED:
             return UNNOTICED
         return self.last_failure or result.verdict.value
+
+    def seconds_by_kind(self, result: RunResult) -> dict[str, float]:
+        """A run's wall seconds by the kind of work that they went into; what models took stands by itself."""
+        kinds = seconds_by_kind(result)
+        if self.model_calls:
+            kinds = {kind: seconds - self._waited[kind] for kind, seconds in kinds.items()}
+            kinds[THINKING] = float(self._waited.total())
+        return kinds
 
 
 def seconds_by_kind(result: RunResult) -> dict[str, float]:
