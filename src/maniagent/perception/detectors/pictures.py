@@ -29,6 +29,7 @@ COLOURS: tuple[Colour, ...] = (
     (255, 100, 170),
 )
 """RGB, in turn: neighbouring numbers differ."""
+DARK: Colour = (12, 12, 12)
 MIN_SIDE = 480
 """Pixels of the shorter side; smaller pictures are enlarged by a whole factor, or a number would cover a thing."""
 FONT_SIZE = 15
@@ -53,10 +54,10 @@ def draw_marks(rgb: Picture, masks: Sequence[BoolArray]) -> Picture:
     size = (rgb.shape[1] * scale, rgb.shape[0] * scale)
     picture: Picture = np.array(cv2.resize(rgb, size, interpolation=cv2.INTER_CUBIC), np.uint8)
     large = [mask.repeat(scale, axis=0).repeat(scale, axis=1).astype(np.uint8) for mask in masks]
-    numbers = [i for i, mask in enumerate(large) if mask.any()]
-    for i in numbers:
+    numbers = sorted((i for i, mask in enumerate(large) if mask.any()), key=lambda i: int(large[i].sum()))
+    for i in reversed(numbers):
         _outline(picture, large[i], _colour(i))
-    return _label(picture, {i: large[i] for i in sorted(numbers, key=lambda i: int(large[i].sum()))})
+    return _label(picture, {i: large[i] for i in numbers})
 
 
 def _colour(index: int) -> Colour:
@@ -64,11 +65,13 @@ def _colour(index: int) -> Colour:
 
 
 def _outline(picture: Picture, mask: Picture, colour: Colour) -> None:
-    """A thin coloured line just outside the thing, between dark ones: it shows on any ground."""
-    around = cv2.dilate(mask, np.ones((5, 5), np.uint8))
-    contours, _ = cv2.findContours(around, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
-    cv2.drawContours(picture, contours, -1, (12, 12, 12), 3)
-    cv2.drawContours(picture, contours, -1, colour, 1)
+    """A coloured line just outside the thing, between dark ones: it shows on any ground and hides nothing of it."""
+    smooth = cv2.morphologyEx(mask, cv2.MORPH_CLOSE, np.ones((7, 7), np.uint8))
+    contours, _ = cv2.findContours(smooth, cv2.RETR_EXTERNAL, cv2.CHAIN_APPROX_NONE)
+    whole = cv2.drawContours(np.zeros_like(mask), contours, -1, 1, cv2.FILLED)
+    one, two, three = (cv2.dilate(whole, np.ones((3, 3), np.uint8), iterations=i) for i in (1, 2, 3))
+    picture[three > whole] = DARK
+    picture[two > one] = colour
 
 
 # Labels -----------------------------------------------------------------------------------------------------------
@@ -145,7 +148,7 @@ def _draw_label(
     end = (int(columns[nearest]), int(rows[nearest]))
     gap = max(x - end[0], end[0] - x - w, y - end[1], end[1] - y - h)
     if gap > 2 * GAP:
-        for width, fill in ((3, (12, 12, 12)), (1, colour)):
+        for width, fill in ((3, DARK), (1, colour)):
             draw.line([(x + w // 2, y + h // 2), end], fill=fill, width=width)
-    draw.rounded_rectangle((x, y, x + w - 1, y + h - 1), radius=4, fill=(12, 12, 12), outline=colour)
+    draw.rounded_rectangle((x, y, x + w - 1, y + h - 1), radius=4, fill=DARK, outline=colour)
     draw.text((x + w / 2, y + h / 2), text, font=font, fill=(255, 255, 255), anchor="mm")
