@@ -9,20 +9,23 @@ from typer.testing import CliRunner
 from maniagent.cli import app
 from maniagent.envs.simpler import TASKS
 from maniagent.envs.simpler.assets import missing_packages
-from maniagent.errors import UsageError
+from maniagent.errors import SetupError, UsageError
 from maniagent.evaluation import suites
 from maniagent.evaluation.episode import FINAL_PICTURE, MOST_EPISODES, Job
 from maniagent.evaluation.poses import OFF_GRID, Poses
 from maniagent.evaluation.runner import evaluate
-from simplerenv import make, skip_without
+from simplerenv import skip_without
 
 CRITERIA = {"any", "strict", "at 120", "any at 120", "strict at 120"}
 
 
 @pytest.mark.slow
 def test_two_episodes_of_each_task_are_played_to_their_end(tmp_path: Path) -> None:
-    make("simpler-stack").close()
-    summary = evaluate("simpler", out=tmp_path, episodes=2, seeds=1, workers=1, record=False)
+    skip_without()
+    try:
+        summary = evaluate("simpler", out=tmp_path, episodes=2, seeds=1, workers=1, record=False)
+    except SetupError as error:
+        pytest.skip(str(error))
     assert summary.finished == 8
     results = [json.loads(line) for line in (tmp_path / "results.jsonl").read_text().splitlines()]
     assert {result["stage"] for result in results} & {"crash", "time-limit"} == set()
@@ -40,10 +43,12 @@ def test_two_episodes_of_each_task_are_played_to_their_end(tmp_path: Path) -> No
 def test_an_episode_off_the_grid_is_recorded_and_can_be_played_again(
     tmp_path: Path, monkeypatch: pytest.MonkeyPatch
 ) -> None:
-    make("simpler-carrot").close()
+    skip_without()
     monkeypatch.chdir(tmp_path)
     command = ["simpler", "play", "simpler-carrot", "--episode", "31", "--poses", OFF_GRID, "--pose-seed", "5"]
     first, second = (CliRunner().invoke(app, [*command, "--json"]) for _ in range(2))
+    if "doesn't render here" in first.stdout:
+        pytest.skip(json.loads(first.stdout)["error"])
     assert first.exit_code in (0, 1), first.output
     told, again = json.loads(first.stdout), json.loads(second.stdout)
     assert {key: told[key] for key in ("success", "criteria", "steps", "reason")} == {
