@@ -2,6 +2,7 @@ from __future__ import annotations
 
 from dataclasses import replace
 from importlib.metadata import EntryPoint, EntryPoints
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -89,3 +90,18 @@ def test_a_match_is_told_in_the_main_view_or_where_the_thing_is_seen(seen):
     assert Match.of("egg", hidden, 0.5, seen.observation).detection.frame == "side"
     with pytest.raises(ValueError, match="isn't seen"):
         Match.of("egg", replace(egg, masks={}), 0.5, seen.observation)
+
+
+# Documentation ----------------------------------------------------------------------------------------------------
+
+
+def test_the_example_in_the_documentation_finds_both_red_peppers(capsys):
+    text = (Path(__file__).parents[3] / "docs" / "detectors.md").read_text(encoding="utf-8")
+    _, _, rest = text.partition("```python\n")
+    exec(compile(rest.partition("```")[0], "docs/detectors.md", "exec"), {})  # noqa: S102  # our own file
+    assert len(capsys.readouterr().out.splitlines()) == 2
+
+
+def test_the_documentation_names_every_detector():
+    text = (Path(__file__).parents[3] / "docs" / "detectors.md").read_text(encoding="utf-8")
+    assert all(f"| `{name}`" in text for name in detector_names())

@@ -7,6 +7,7 @@ from __future__ import annotations
 
 from collections.abc import Iterable, Sequence
 from dataclasses import dataclass
+from functools import lru_cache
 from typing import Any, Protocol
 
 import numpy as np
@@ -75,8 +76,11 @@ class Pretrained:
         return self.processor(images=Image.fromarray(rgb), text=text, return_tensors="pt", **options).to(self.device)
 
 
+@lru_cache(maxsize=2)
 def load_pretrained(architecture: str, model_class: str, where: str) -> Pretrained:
     """Load an architecture (a `model_type` of transformers) from a folder or a Hub id; on the GPU where there is one.
+
+    Weights stay loaded: an evaluation makes its agents anew for every episode.
 
     Raises SetupError where the extra is not installed, where the weights are not there and can't be fetched, and
     where what is there is another architecture, damaged or not complete.
