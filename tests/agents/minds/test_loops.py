@@ -7,9 +7,9 @@ from maniagent.models.question import Unfit
 from maniagent.types import ExecutionReport, SubtaskRecord, Verdict
 
 
-def tried(text: str, verdict: Verdict = Verdict.FAILURE) -> SubtaskRecord:
+def tried(text: str, verdict: Verdict = Verdict.FAILURE, stage: str = "grasp") -> SubtaskRecord:
     done = verdict is Verdict.SUCCESS
-    return SubtaskRecord(text, (), ExecutionReport(completed=done, reached=0, reason="", stage="grasp"), verdict)
+    return SubtaskRecord(text, (), ExecutionReport(completed=done, reached=0, reason="", stage=stage), verdict)
 
 
 A, B = "put the egg on the plate", "put the egg on the table"
@@ -48,3 +48,9 @@ def test_the_notice_grows_with_the_number_of_attempts() -> None:
 def test_after_many_failures_of_any_kind_only_giving_up_is_left() -> None:
     with pytest.raises(Unfit, match="answer cannot"):
         refuse_loop(A, [tried(f"{B} {n}") for n in range(MOST_FAILURES + 1)])
+
+
+def test_a_model_out_of_reach_is_not_the_subtasks_fault() -> None:
+    unreached = [tried(A, stage="model")] * MOST_FAILURES
+    refuse_loop(A, [*unreached, tried(A)])
+    assert notice(unreached) == ""

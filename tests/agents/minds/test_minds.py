@@ -267,6 +267,21 @@ def test_positions_are_measured_once_when_asked_for() -> None:
     assert "Decide: act, done or cannot" in model.refusals[-1]
 
 
+def test_what_can_not_be_measured_is_told_and_decided_without() -> None:
+    class Clueless(Words):
+        def detect(
+            self, queries: Sequence[str], view: TableView, observation: Observation
+        ) -> tuple[tuple[Match, ...], ...]:
+            raise DetectionFailure("I don't know the word 'plate'.")
+
+    ask = end("measure", "none", objects=["plate"])
+    model = ScriptedModel({"scene": [seen(*PEPPERS)], "reasoning": [ask, end("cannot", "none")]})
+    agents = minds_agents(RIG, model, model, Clueless())
+    agents.scene.describe("put the middle pepper on the plate", look("middle-pepper"))
+    assert next_subtask(agents).cannot
+    assert "nothing could be measured: I don't know the word" in model.asked[-1].parts[0]
+
+
 # Objects ----------------------------------------------------------------------------------------------------------
 
 MIDDLE = Subtask(

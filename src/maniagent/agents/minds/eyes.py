@@ -10,7 +10,7 @@ from collections.abc import Sequence
 
 import numpy as np
 
-from ...errors import SceneFailure
+from ...errors import DetectionFailure, SceneFailure
 from ...perception.detectors.protocol import Detector, Match
 from ...perception.segmentation import TableView
 from ...perception.segments import Segment
@@ -56,8 +56,12 @@ class Eyes:
 
     def measure(self, names: Sequence[str]) -> str:
         """Where the named objects are, one a line, in metres."""
+        try:
+            matches_by_name = self.find(names)
+        except DetectionFailure as failure:
+            return f"nothing could be measured: {one_line(str(failure))}"
         lines = []
-        for name, matches in zip(names, self.find(names), strict=True):
+        for name, matches in zip(names, matches_by_name, strict=True):
             found = [_whereabouts(match.segment) for match in matches[:MOST_MEASURED]]
             lines += [f"{one_line(name)}: {where}" for where in found or ["not found by the detector"]]
         return "\n".join(lines)

@@ -4,6 +4,7 @@ from __future__ import annotations
 
 from collections.abc import Sequence
 
+from ...errors import FailureStage
 from ...models.question import Unfit
 from ...types import SubtaskRecord, Verdict
 from .telling import one_line, plain
@@ -16,6 +17,7 @@ MOST_FAILURES = 6
 
 def notice(records: Sequence[SubtaskRecord]) -> str:
     """What to say of repetitions so far; empty where there are none worth a word."""
+    records = _meant(records)
     if not records:
         return ""
     failures = _failures(records)
@@ -30,6 +32,7 @@ def notice(records: Sequence[SubtaskRecord]) -> str:
 
 def refuse_loop(text: str, records: Sequence[SubtaskRecord]) -> None:
     """Raise Unfit where sub-task `text` would be one attempt too many, or close a circle."""
+    records = _meant(records)
     if _failures(records) > MOST_FAILURES:
         raise Unfit(f"More than {MOST_FAILURES} attempts in a row have failed: answer cannot and say why.")
     times = _tried(records, text)
@@ -41,6 +44,11 @@ def refuse_loop(text: str, records: Sequence[SubtaskRecord]) -> None:
             f'You go round in circles: "{one_line(records[-2].text)}" and "{one_line(records[-1].text)}" by turns. '
             "Find another way, or answer cannot."
         )
+
+
+def _meant(records: Sequence[SubtaskRecord]) -> list[SubtaskRecord]:
+    """The attempts that say something of the sub-task: that a model can't be reached is not its fault."""
+    return [record for record in records if record.outcome.stage != FailureStage.MODEL]
 
 
 def _tried(records: Sequence[SubtaskRecord], text: str) -> int:

@@ -95,8 +95,9 @@ def _judged(records: Sequence[SubtaskRecord], thought: Thought) -> tuple[Subtask
 def _to_subtask(thought: Thought, names: Sequence[str], memory: Memory) -> Subtask:
     verdict = _VERDICTS[thought.previous] if len(memory) else Verdict.INITIAL
     if thought.next != "act":
-        reason = f"{thought.evidence} {thought.remaining}".strip()[:2000]
-        return Subtask(previous=verdict, reason=reason, done=thought.next == "done", cannot=thought.next == "cannot")
+        done = thought.next == "done"
+        why = [thought.evidence] if done and thought.evidence else [thought.evidence, thought.remaining]
+        return Subtask(previous=verdict, reason=" ".join(filter(None, why))[:2000], done=done, cannot=not done)
     known = {plain(name): name for name in names}
     objects = tuple(known[plain(name)] for name in thought.objects)
     return Subtask(previous=verdict, reason=thought.evidence, text=thought.subtask, objects=objects)
