@@ -21,6 +21,7 @@ from .commands.crew import (
     Vlm,
     crew_from,
 )
+from .commands.replay import replay
 
 if TYPE_CHECKING:
     from .app import RunOutcome
@@ -38,6 +39,7 @@ app = typer.Typer(
 app.add_typer(cache.app, name="cache")
 app.add_typer(models.app, name="models")
 app.add_typer(simpler.app, name="simpler")
+app.command()(replay)
 
 
 def main() -> None:

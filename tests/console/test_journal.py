@@ -9,10 +9,6 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from maniagent.console.journal import read_lines, to_line, to_plain
-from maniagent.motion import ArmModel
-from maniagent.perception.rig import Rig
-from maniagent.robots.body_filter import BodyFilter
-from maniagent.testing import no_body
 from maniagent.types import Event, Gripper
 
 plain = st.recursive(
@@ -46,13 +42,6 @@ def test_numbers_json_cannot_hold_become_null(value: float) -> None:
 def test_floats_read_back_bit_by_bit(value: float) -> None:
     line = to_line(Event("planned", 0.0, {"value": np.array([value])}))
     assert np.float64(json.loads(line)["value"][0]).tobytes() == np.float64(value).tobytes()
-
-
-def test_a_rig_is_written_without_the_arms_model() -> None:
-    rig = to_plain(Rig(BodyFilter(ArmModel())))
-    assert rig["covers_robot"] == {"margin": 0.02, "arm": "wx250s"}
-    assert to_plain(Rig(no_body))["covers_robot"] == "maniagent.testing.no_body"
-    assert rig["gripper"]["max_opening"] == 0.048
 
 
 def test_images_are_summarised_and_matrices_kept() -> None:

@@ -5,6 +5,7 @@ from __future__ import annotations
 import datetime
 import re
 import shutil
+import zlib
 from pathlib import Path
 
 from ..errors import UsageError
@@ -22,6 +23,19 @@ def default_folder(name: str | None, seed: int, now: datetime.datetime | None = 
     stamp = (now or datetime.datetime.now()).strftime("%Y%m%d-%H%M%S")
     slug = re.sub(r"[^a-z0-9]+", "-", (name or "scene").lower())[:40].strip("-") or "scene"
     return Path("runs") / f"{stamp}-{slug}-s{seed}"
+
+
+def picture_name(turn: int, view: str, what: str = "") -> str:
+    """The picture of a view, within OBSERVATIONS; `what` says what of it is shown where it isn't its colours."""
+    slug = re.sub(r"[^A-Za-z0-9_]+", "_", view)
+    if slug != view:  # two views that are spelled alike don't share a file
+        slug += f"_{zlib.crc32(view.encode('utf-8', 'replace')):08x}"
+    return f"turn-{turn:02d}-{slug}{f'-{what}' if what else ''}.png"
+
+
+def look_name(turn: int) -> str:
+    """All that was seen on a turn but the colours, within OBSERVATIONS."""
+    return f"turn-{turn:02d}.npz"
 
 
 def prepare(folder: Path) -> None:

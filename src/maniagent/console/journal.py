@@ -9,7 +9,6 @@ from __future__ import annotations
 
 import dataclasses
 import enum
-import inspect
 import json
 import math
 from collections.abc import Mapping
@@ -75,8 +74,6 @@ def to_plain(value: Any) -> Any:
             return _fields(dataclasses.replace(value, grasps=value.grasps[:_GRASPS_KEPT]))
         case _ if dataclasses.is_dataclass(value):
             return _fields(value)
-        case _ if inspect.isroutine(value):
-            return f"{value.__module__}.{value.__qualname__}"
         case _:
             return str(value)
 

@@ -2,6 +2,7 @@
 
 events.jsonl                     one line an event, flushed as it happens
 observations/turn-01-main.png    each view of each turn; turn-01-main-depth.png is its depth in colours
+observations/turn-01.npz         the rest of what was seen, without loss: depth, cameras, joints (replay/looks.py)
 detections/turn-01.png           the main view with what was found and how it will be grasped
 sequences/turn-01.json           the action sequence
 video.mp4                        the main view while the arm moves, captioned
@@ -11,7 +12,7 @@ summary.json, report.html        at the end
 from __future__ import annotations
 
 import json
-import re
+from dataclasses import replace
 from pathlib import Path
 from types import TracebackType
 from typing import Any, Self
@@ -20,9 +21,11 @@ import numpy as np
 from numpy.typing import NDArray
 from PIL import Image
 
+from ..replay.looks import save_look
+from ..replay.rigs import rig_to_plain
 from ..types import ActionSequence, Event, Observation
 from .annotate import colour_depth, draw_detections
-from .folder import DETECTIONS, EVENTS, OBSERVATIONS, SEQUENCES, SUMMARY, VIDEO, prepare
+from .folder import DETECTIONS, EVENTS, OBSERVATIONS, SEQUENCES, SUMMARY, VIDEO, look_name, picture_name, prepare
 from .journal import to_line
 from .report import write_report
 from .summary import summarise
@@ -62,6 +65,8 @@ class Recorder:
         if event.kind == "frame":
             self._video.write(event.data["rgb"], event.data["robot_time"], self._title, self._move)
             return
+        if event.kind == "begun":
+            event = replace(event, data={**event.data, "rig": rig_to_plain(event.data["rig"])})
         files = self._keep(event)
         extra: dict[str, Any] = {"video_time": round(self._video.seconds, 2)} | ({"files": files} if files else {})
         self._log.write(to_line(event, **extra) + "\n")
@@ -101,9 +106,10 @@ class Recorder:
     def _keep_observation(self, turn: int, observation: Observation) -> dict[str, str]:
         files = {}
         for name, frame in observation.frames.items():
-            stem = f"turn-{turn:02d}-{_slug(name)}"
-            files[name] = self._save(frame.rgb, OBSERVATIONS, f"{stem}.png")
-            files[f"{name} depth"] = self._save(colour_depth(frame.depth), OBSERVATIONS, f"{stem}-depth.png")
+            depth = colour_depth(frame.depth)
+            files[name] = self._save(frame.rgb, OBSERVATIONS, picture_name(turn, name))
+            files[f"{name} depth"] = self._save(depth, OBSERVATIONS, picture_name(turn, name, "depth"))
+        save_look(self.folder / OBSERVATIONS / look_name(turn), observation)
         return files
 
     def _keep_sequence(self, turn: int, sequence: ActionSequence) -> str:
@@ -128,7 +134,3 @@ class Recorder:
         path = self.folder / relative
         path.parent.mkdir(exist_ok=True)
         path.write_text(text + "\n", encoding="utf-8")
-
-
-def _slug(name: str) -> str:
-    return re.sub(r"[^A-Za-z0-9_]+", "_", name)
