@@ -14,7 +14,8 @@ from ..errors import FormatFailure, ModelFailure, StageFailure
 from .answers import fit
 from .background import wait_for
 from .budget import Allowance, Budget, Spent
-from .endpoint import Endpoint, Prompt, Reply, Turn
+from .dialogue import Prompt, Reply, Turn
+from .endpoint import Endpoint
 from .exchange import Exchange, FailureKind, Mode, OnExchange, Output
 from .faults import Fault
 from .patience import Patience

@@ -17,7 +17,8 @@ from ..errors import FormatFailure, ModelFailure
 from .answers import fit
 from .background import wait_for
 from .chat import LiveModel
-from .endpoint import Endpoint, Prompt
+from .dialogue import Prompt
+from .endpoint import Endpoint
 from .exchange import Exchange, Mode, Output
 from .faults import Fault
 from .names import parse_name
@@ -176,7 +177,7 @@ def _enforced(endpoint: Endpoint, mode: Mode, patience: Patience) -> Finding:
         sent = endpoint.send(prompt, mode, max_tokens=patience.max_tokens, timeout=patience.timeout, tell_schema=False)
         fit(wait_for(sent).text, question)
     except Fault as fault:
-        return Finding(name, False, f"refused: {fault}")
+        return Finding(name, False, f"{'refused' if fault.kind == 'refused' else 'no answer'}: {fault}")
     except Unfit as unfit:
         return Finding(name, False, f"not kept: {str(unfit).splitlines()[0]}")
     return Finding(name, True, "kept, without being told in words")

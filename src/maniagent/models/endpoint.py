@@ -1,67 +1,26 @@
-"""One request to one model through its provider's own client library; the only module that knows pydantic-ai.
+"""One request to one model through its provider's own client library.
 
 Retries, budgets and repair stand elsewhere: here a request is sent once, and whatever goes wrong becomes a `Fault`.
 """
 
 from __future__ import annotations
 
-import json
-from collections.abc import Sequence
-from dataclasses import dataclass, replace
+from dataclasses import replace
 from typing import TYPE_CHECKING, Any
 
-from pydantic import BaseModel
-
+from .dialogue import Prompt, Reply, to_messages, to_parameters, to_reply
 from .exchange import Mode
 from .faults import Fault, to_fault
 from .names import Address
-from .pictures import to_png
-from .question import Picture
 from .transport import TooLong, missing_extra, open_client
 
 if TYPE_CHECKING:
-    from pydantic_ai.messages import ModelMessage, ModelResponse, UserContent
-    from pydantic_ai.models import Model, ModelRequestParameters
+    from pydantic_ai.models import Model
 
-_ANSWER_TOOL = "answer"
-_LONGEST_SAID = 20_000
-"""Characters of an unfit answer that go back with the complaint."""
+_UNREADABLE = (TypeError, ValueError, AttributeError, LookupError)
+"""What client libraries raise on bodies that aren't what they trust a server to send."""
 _SHORTEST_SECRET = 8
 """Characters; a shorter key is a placeholder for a local server, and may be a word of an answer."""
-_SCHEMA_TOLD = "\n\nAnswer with one JSON object that fits this JSON schema, and nothing else:\n{schema}"
-
-
-@dataclass(frozen=True)
-class Reply:
-    """What came back."""
-
-    text: str
-    """The answer, or the arguments of the tool call."""
-    tokens_in: int | None
-    """None where the server doesn't say."""
-    tokens_out: int | None
-    cut_off: bool
-    """The answer reached the most tokens it may have."""
-    message: ModelResponse
-    """The library's own, to go on from."""
-
-
-@dataclass(frozen=True)
-class Turn:
-    """An answer that didn't fit, and why."""
-
-    reply: Reply
-    complaint: str
-
-
-@dataclass(frozen=True)
-class Prompt:
-    """Everything that a request says, whatever the way in which it is sent."""
-
-    instructions: str
-    parts: tuple[str | Picture, ...]
-    form: type[BaseModel]
-    turns: tuple[Turn, ...] = ()
 
 
 class Endpoint:
@@ -93,15 +52,18 @@ class Endpoint:
 
         `tell_schema` also puts the schema into the instructions; None does so where the model wouldn't see it else.
         """
+        from httpx2 import HTTPError
         from pydantic_ai.direct import model_request
-        from pydantic_ai.exceptions import AgentRunError
+        from pydantic_ai.exceptions import AgentRunError, UserError
         from pydantic_ai.settings import ModelSettings
 
         settings = ModelSettings(max_tokens=max_tokens, timeout=timeout, request_timeout=timeout, max_retries=0)
         if temperature is not None:
             settings["temperature"] = temperature
-        told = tell_schema if tell_schema is not None else mode == "prompt" or self.address.provider.own
-        messages, parameters = _messages(prompt, mode, tell_schema=told), _parameters(prompt.form, mode)
+        own = self.address.provider.own
+        told = tell_schema if tell_schema is not None else mode == "prompt" or own
+        messages = to_messages(prompt, mode, tell_schema=told)
+        parameters = to_parameters(prompt.form, mode, strict=None if own else True)
         fault: Fault | None = None
         try:
             response = await model_request(
@@ -109,9 +71,15 @@ class Endpoint:
             )
         except (AgentRunError, TooLong) as error:
             fault = to_fault(error, timeout)
+        except UserError as error:  # what the library knows the model can't do
+            fault = Fault("final", str(error))
+        except (HTTPError, *_UNREADABLE) as error:
+            fault = Fault("passing", f"the server's answer can't be read ({type(error).__name__})", sent=True)
         if fault is not None:  # raised out here, so that no request, and so no key, hangs on it
             raise Fault(fault.kind, self._without_key(str(fault)), fault.retry_after, sent=fault.sent)
-        reply = _reply(response)
+        if response.finish_reason == "content_filter":
+            raise Fault("final", "the provider's content filter withheld the answer", sent=True)
+        reply = to_reply(response)
         return replace(reply, text=self._without_key(reply.text))
 
     def _without_key(self, text: str) -> str:
@@ -166,76 +134,3 @@ def _open_openai(address: Address, secret: str | None, client: Any) -> Model:
         address.provider_name, base_url=address.base_url, api_key=secret, http_client=client, profile=profile
     )
     return OpenAIChatModel(address.model, provider=compatible)
-
-
-def _parameters(form: type[BaseModel], mode: Mode) -> ModelRequestParameters:
-    from pydantic_ai.models import ModelRequestParameters
-    from pydantic_ai.output import OutputObjectDefinition
-    from pydantic_ai.tools import ToolDefinition
-
-    schema = form.model_json_schema()
-    match mode:
-        case "schema":
-            described = OutputObjectDefinition(json_schema=schema, name=form.__name__)
-            return ModelRequestParameters(output_mode="native", output_object=described, prompted_output_template=False)
-        case "tool":
-            tool = ToolDefinition(
-                name=_ANSWER_TOOL,
-                description="Gives your answer.",
-                parameters_json_schema=schema,
-                kind="output",
-            )
-            return ModelRequestParameters(output_mode="tool", output_tools=[tool], allow_text_output=False)
-        case "prompt":
-            return ModelRequestParameters(output_mode="text")
-
-
-def _messages(prompt: Prompt, mode: Mode, *, tell_schema: bool) -> list[ModelMessage]:
-    from pydantic_ai.messages import ModelRequest, UserPromptPart
-
-    instructions = prompt.instructions
-    if tell_schema:
-        instructions += _SCHEMA_TOLD.format(schema=json.dumps(prompt.form.model_json_schema()))
-    question = UserPromptPart([_content(part) for part in prompt.parts])
-    messages: list[ModelMessage] = [ModelRequest([question], instructions=instructions)]
-    for turn in prompt.turns:
-        messages += _told_again(turn, mode, instructions)
-    return messages
-
-
-def _content(part: str | Picture) -> UserContent:
-    from pydantic_ai.messages import BinaryContent
-
-    return part if isinstance(part, str) else BinaryContent(to_png(part.rgb), media_type="image/png")
-
-
-def _told_again(turn: Turn, mode: Mode, instructions: str) -> Sequence[ModelMessage]:
-    """The model's answer and what is wrong with it, in the form its protocol wants."""
-    from pydantic_ai.messages import ModelRequest, ModelResponse, TextPart, ToolReturnPart, UserPromptPart
-
-    complaint = f"{turn.complaint}\nAnswer again, completely."
-    calls = turn.reply.message.tool_calls if mode == "tool" else []
-    if calls:
-        returned = [ToolReturnPart(call.tool_name, complaint, call.tool_call_id) for call in calls]
-        return turn.reply.message, ModelRequest(returned, instructions=instructions)
-    said = ModelResponse([TextPart(turn.reply.text[:_LONGEST_SAID] or "(nothing)")])
-    return said, ModelRequest([UserPromptPart(complaint)], instructions=instructions)
-
-
-def _reply(response: ModelResponse) -> Reply:
-    from pydantic_ai.messages import TextPart
-
-    calls = response.tool_calls
-    text = "".join(part.content for part in response.parts if isinstance(part, TextPart))
-    if calls:
-        text = calls[0].args_as_json_str()
-    measured = not response.usage.unmeasured_requests
-    if response.finish_reason == "content_filter":
-        raise Fault("final", "the provider's content filter withheld the answer")
-    return Reply(
-        text=text,
-        tokens_in=response.usage.input_tokens if measured else None,
-        tokens_out=response.usage.output_tokens if measured else None,
-        cut_off=response.finish_reason == "length",
-        message=response,
-    )

@@ -84,7 +84,7 @@ def parse_name(name: str, base_url: str | None = None) -> Address:
     """
     plain, at, url = name.partition("@http")
     provider_name, colon, model = plain.partition(":")
-    if not colon or not model:
+    if not (provider_name and colon and model):
         raise UsageError(f"A model is named PROVIDER:MODEL, not {plain!r}. Providers: {', '.join(PROVIDERS)}.")
     if provider_name not in PROVIDERS:
         raise UnknownNameError("model provider", provider_name, PROVIDERS)
