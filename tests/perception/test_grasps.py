@@ -202,6 +202,18 @@ def _yaw(grasp: GraspPose) -> float:
     return yaw_of_top_down(grasp.T_base_grasp[:3, :3])
 
 
+def test_near_a_wall_the_hand_is_moved_aside() -> None:
+    segment, grid = bar(0.0)
+    rows, columns = grid.cells(np.array([[0.18, 0.034], [0.38, 0.056]])).T
+    height = grid.height.copy()
+    height[rows[0] : rows[1], columns[0] : columns[1]] = 0.05
+    walled = HeightMap(grid.origin, grid.cell, height, grid.rgb, height > 0, height == 0)
+    gripper = replace(GRIPPER, min_opening=GRIPPER.max_opening)  # open or closed: half open it would fit
+    across = [g for g in propose_grasps(segment, walled, gripper) if turned(_yaw(g), 0.0) < np.radians(10)]
+    assert across
+    assert max(g.T_base_grasp[1, 3] for g in across) < -0.005
+
+
 # Springy fingers ------------------------------------------------------------------------------------------------------
 
 

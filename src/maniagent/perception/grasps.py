@@ -91,7 +91,7 @@ def propose_grasps(
     found = found.take(_closes(found, gripper, tuning))
     roomy = _with_room(found, grid, gripper, tuning)
     if not len(roomy.tip):  # beside a wall one finger goes close to the object, and pushes it to the other
-        roomy = _with_room(found.moved_aside(gripper, tuning), grid, gripper, tuning)
+        roomy = _with_room(_moved_aside(found, grid, gripper, tuning), grid, gripper, tuning)
     return _best(roomy, surface, segment, gripper, tuning)
 
 
@@ -131,12 +131,6 @@ class _Candidates:
         """(N,) m, how far the fingers are opened on the way down."""
         wanted = self.width + 2 * (tuning.finger_clearance + tuning.spread)
         return np.clip(wanted, gripper.min_opening, gripper.max_opening)
-
-    def moved_aside(self, gripper: GripperShape, tuning: GraspTuning) -> _Candidates:
-        """The same with the hand as far to either side as the open fingers still pass the object."""
-        slack = (self.opening(gripper, tuning) - self.width) / 2 - tuning.finger_clearance
-        aside = np.maximum(slack, 0.0)[:, None] * self.axes[1]
-        return _Candidates.concatenate([replace(self, origin=self.origin + side) for side in (aside, -aside)])
 
 
 def _surface(segment: Segment, grid: HeightMap) -> FloatArray:
@@ -256,6 +250,19 @@ def _with_room(found: _Candidates, grid: HeightMap, gripper: GripperShape, tunin
     span = np.linspace(-gripper.palm_half_span, gripper.palm_half_span, 12)
     palm = np.broadcast_to(span, (len(found.tip), len(span)))
     return found.take(_highest(found, palm, gripper.palm_half_width, grid) < found.tip + gripper.palm_height)
+
+
+def _moved_aside(found: _Candidates, grid: HeightMap, gripper: GripperShape, tuning: GraspTuning) -> _Candidates:
+    """The same with the hand to either side until one open finger just passes the object, and nothing between."""
+    opening = found.opening(gripper, tuning)
+    slack = np.maximum((opening - found.width - tuning.finger_clearance) / 2, 0.0)
+    parts = []
+    for side in (1.0, -1.0):
+        gap = side * np.linspace(found.width / 2 + tuning.finger_clearance, opening / 2 + slack, 5, axis=-1)
+        free = _highest(found, gap, gripper.finger_half_width, grid) < found.tip
+        moved = replace(found, origin=found.origin + side * slack[:, None] * found.axes[1])
+        parts.append(moved.take(free))
+    return _Candidates.concatenate(parts)
 
 
 def _highest(found: _Candidates, v: FloatArray, half_width: float, grid: HeightMap) -> NDArray[np.floating]:
