@@ -1,5 +1,6 @@
 """Replays of scripted runs: the same where nothing changed, the first difference where something did."""
 
+import contextlib
 import json
 from collections.abc import Callable
 from dataclasses import replace
@@ -181,6 +182,18 @@ def test_a_log_that_is_damaged_is_one_clear_error(folder: Path, edit: Callable[[
     rewrite(folder, lines)
     with pytest.raises(UsageError):
         replay(folder, ONCE.agents)
+
+
+@pytest.mark.parametrize("name", ["written anew", "blind once"])
+def test_whatever_is_missing_in_a_log_a_replay_ends_in_a_result_or_one_clear_error(tmp_path: Path, name: str) -> None:
+    record(tmp_path, SCENARIOS[name])
+    lines = lines_of(tmp_path)
+    first = {(line["kind"], key): number for number, line in reversed(list(enumerate(lines))) for key in line}
+    for (_, key), number in first.items():
+        without = {other: value for other, value in lines[number].items() if other != key}
+        rewrite(tmp_path, [*lines[:number], without, *lines[number + 1 :]])
+        with contextlib.suppress(UsageError):
+            replay(tmp_path, SCENARIOS[name].agents)
 
 
 def test_a_look_that_is_gone_is_told(folder: Path) -> None:

@@ -38,8 +38,12 @@ def replay(folder: Annotated[Path, typer.Argument(help="A run folder.")], as_jso
 
 
 def _lines(result: ReplayResult) -> list[str]:
-    seen = f"{result.decisions} decisions on {result.turns} turns"
+    seen = f"{_counted(result.decisions, 'decision')} on {_counted(result.turns, 'turn')}"
     lines = [f"The same: {seen}." if result.same else f"Different after {seen}: {printable(str(result.difference))}"]
     if not result.complete:
         lines.append("The recorded run was cut short; this is as far as it goes.")
     return lines
+
+
+def _counted(count: int, thing: str) -> str:
+    return f"{count} {thing}" if count == 1 else f"{count} {thing}s"

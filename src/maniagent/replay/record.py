@@ -18,11 +18,20 @@ from .rigs import rig_from_plain
 
 Json = dict[str, Any]
 
-LOOP = frozenset({
-    "observed", "described", "reasoned", "located", "cache", "checked", "planned", "move", "homed", "executed",
-    "failed",
-})  # fmt: skip
-"""Kinds of events that the loop tells, each the same in a replay."""
+LOOP: dict[str, tuple[str, ...]] = {
+    "observed": (),
+    "described": (),
+    "reasoned": (),
+    "located": (),
+    "cache": ("found", "sequence"),
+    "checked": ("reason",),
+    "planned": (),
+    "move": ("description", "seconds"),
+    "homed": ("report",),
+    "executed": ("report",),
+    "failed": ("stage", "reason"),
+}
+"""Kinds of events that the loop tells, each the same in a replay, and what of their data a replay answers with."""
 
 
 @dataclass(frozen=True)
@@ -87,6 +96,7 @@ def _first(lines: list[Json], kind: str) -> Json | None:
 def _told_by_loop(lines: list[Json]) -> list[Json]:
     events = [line for line in lines if line["kind"] in LOOP]
     for event in events:
-        if not isinstance(event["turn"], int):
-            raise TypeError(f"turn {event['turn']!r}")
+        missing = [name for name in LOOP[event["kind"]] if name not in event]
+        if missing or not isinstance(event["turn"], int):
+            raise ValueError(f"{event['kind']} of turn {event['turn']!r} without {', '.join(missing) or 'a number'}")
     return events

@@ -8,7 +8,7 @@ from collections.abc import Callable, Sequence
 from pydantic import TypeAdapter, ValidationError
 
 from ..console.folder import OBSERVATIONS, look_name, picture_name
-from ..errors import CameraFailure, FailureStage, MotionRejected, StageFailure, UsageError
+from ..errors import FailureStage, MotionRejected, StageFailure, UsageError
 from ..perception.rig import Rig
 from ..robots.robot import Boxes
 from ..types import ExecutionReport, KeyPoint, Observation
@@ -89,9 +89,13 @@ class ReplayRobot:
 
 
 def _failure_of(event: Json) -> StageFailure:
+    """The failure with the recorded stage; no other class of it makes a difference before anything was seen."""
     failure = StageFailure(str(event["reason"]))
-    failure.stage = FailureStage(event["stage"])
-    return CameraFailure(str(event["reason"])) if failure.stage is FailureStage.CAMERA else failure
+    try:
+        failure.stage = FailureStage(event["stage"])
+    except ValueError as error:
+        raise UsageError(f"The log is damaged: turn {event['turn']} failed at {event['stage']!r}.") from error
+    return failure
 
 
 def _report(event: Json) -> ExecutionReport:
