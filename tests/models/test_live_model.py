@@ -170,7 +170,7 @@ def test_a_server_that_asks_for_a_long_wait_is_given_up_at_once(asked_for: str) 
     started = time.monotonic()
     answer, asked, _ = ask(fails(429, "slow down", retry_after=asked_for))
     assert isinstance(answer, ModelFailure)
-    assert "HTTP 429: slow down" in str(answer)
+    assert f"HTTP 429: slow down (it asks to wait {asked_for} s)" in str(answer)
     assert (len(asked), time.monotonic() - started < 2.0) == (1, True)
 
 

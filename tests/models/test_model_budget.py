@@ -89,6 +89,17 @@ def test_waiting_ends_with_the_seconds_of_the_run() -> None:
     assert len(server.asked) == 1
 
 
+def test_no_wait_between_attempts_is_longer_than_the_seconds_that_are_left() -> None:
+    started = time.monotonic()
+    with (
+        serving(fails(429, retry_after="2")) as server,
+        opened(f"{LOCAL}@{server.url}/v1", budget=Budget(Limits(seconds=1.5))) as (model, _),
+        pytest.raises(ModelFailure, match=r"budget of 1\.5 seconds"),
+    ):
+        model.ask(question())
+    assert time.monotonic() - started < 1.5
+
+
 def test_money_is_counted_with_the_users_prices() -> None:
     budget = Budget(Limits(money=0.001))
     prices = {LOCAL: Price(input=1.0, output=10.0)}

@@ -113,8 +113,10 @@ class Budget:
             self._spent = self._spent - allowance.reserved + spent
 
     def wait(self, seconds: float) -> None:
-        """Book a wait between two attempts."""
+        """Book a wait between two attempts; raises ModelFailure where less time is left."""
         with self._lock:
+            if seconds > self._left().seconds:
+                raise self._used_up("seconds", self.limits.seconds)
             self._spent += Spent(seconds=seconds)
 
     def _left(self) -> _Left:

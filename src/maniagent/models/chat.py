@@ -180,7 +180,8 @@ class LiveModel:
         if fault.kind == "key":
             return f"{self.name} refuses the key in {address.provider.keys[0]}: {fault}"
         where = f" at {address.base_url}" if address.base_url else ""
-        return f"{self.name}{where} gives no answer: {fault}"
+        asks = f" (it asks to wait {fault.retry_after:g} s)" if fault.retry_after else ""
+        return f"{self.name}{where} gives no answer: {fault}{asks}"
 
     def _exchange(
         self, question: Question[Any], notes: _Notes, answer: BaseModel | None, failure: StageFailure | None

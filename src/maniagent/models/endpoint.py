@@ -10,7 +10,7 @@ from typing import TYPE_CHECKING, Any
 
 from .dialogue import Prompt, Reply, to_messages, to_parameters, to_reply
 from .exchange import Mode
-from .faults import Fault, to_fault
+from .faults import Fault, one_line, to_fault
 from .names import Address
 from .transport import TooLong, missing_extra, open_client
 
@@ -72,9 +72,10 @@ class Endpoint:
         except (AgentRunError, TooLong) as error:
             fault = to_fault(error, timeout)
         except UserError as error:  # what the library knows the model can't do
-            fault = Fault("final", str(error))
+            fault = Fault("final", one_line(str(error)))
         except (HTTPError, *_UNREADABLE) as error:
-            fault = Fault("passing", f"the server's answer can't be read ({type(error).__name__})", sent=True)
+            reason = one_line(f"{type(error).__name__}: {error}")
+            fault = Fault("passing", f"the server's answer can't be read ({reason})", sent=True)
         if fault is not None:  # raised out here, so that no request, and so no key, hangs on it
             raise Fault(fault.kind, self._without_key(str(fault)), fault.retry_after, sent=fault.sent)
         if response.finish_reason == "content_filter":

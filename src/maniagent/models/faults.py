@@ -58,9 +58,13 @@ def _reason(error: AgentRunError | TooLong) -> str:
     """One line: the HTTP status where there is one, and the server's own words."""
     status = getattr(error, "status_code", None)
     words = _words(getattr(error, "body", None)) or ("" if status else _with_cause(error))
+    return ": ".join(filter(None, (status and f"HTTP {status}", one_line(words))))
+
+
+def one_line(words: str) -> str:
+    """Words of others, short and without control characters."""
     told = " ".join("".join(c if c.isprintable() else " " for c in words).split())
-    told = told if len(told) <= _LONGEST_REASON else f"{told[: _LONGEST_REASON - 4]} ..."
-    return ": ".join(filter(None, (status and f"HTTP {status}", told)))
+    return told if len(told) <= _LONGEST_REASON else f"{told[: _LONGEST_REASON - 4]} ..."
 
 
 def _with_cause(error: BaseException) -> str:
