@@ -100,6 +100,14 @@ PUT: Json = {
         {"do": "leave", "to": "here", "up": 0.1},
     ],
 }
+
+
+def laid(side: str) -> Json:
+    *take, over, down, leave = PUT["steps"]
+    beside = {"to": side, "lie": "away"}
+    return {"skill": "pick-and-place", "steps": [*take, {**over, **beside}, {**down, **beside}, leave]}
+
+
 PEPPERS = ("left green pepper", "middle red pepper", "right red pepper", "plate")
 
 
@@ -144,6 +152,25 @@ def test_a_pepper_is_put_on_the_plate_by_what_a_model_writes() -> None:
     judged = model.asked[-1].parts[0]
     assert "the arm made every movement" in judged
     assert "Measured: what looks like the red pepper is now at" in judged
+
+
+@pytest.mark.slow
+def test_knife_and_fork_are_laid_beside_the_plate_one_a_turn_pointing_away() -> None:
+    names = ("fork", "knife", "plate")
+    model = ScriptedModel(
+        {
+            "scene": [seen(*names)],
+            "reasoning": [
+                act("lay the fork left of the plate, pointing away", "fork", "plate"),
+                act("lay the knife right of the plate, pointing away", "knife", "plate", previous="success"),
+                end("done"),
+            ],
+            "controller": [laid("left"), laid("right")],
+        }
+    )
+    outcome = run(task="lay-the-table", seed=2, agents=lambda rig: minds_agents(rig, model, model, Words()))
+    assert (outcome.result.verdict, outcome.achieved) == (RunVerdict.ACHIEVED, True)
+    assert [record.verdict for record in outcome.result.subtasks] == [Verdict.SUCCESS] * 2
 
 
 @pytest.mark.slow

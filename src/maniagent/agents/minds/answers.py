@@ -1,12 +1,13 @@
 """The forms of the agents' answers: flat, small, every text and list bounded, so that a weak model copes with them.
 
-The order of the fields is the order of thinking: evidence stands before what follows from it.
+The order of the fields is the order of thinking: evidence stands before what follows from it. What the fields mean is
+said in the prompts; `steps` says what becomes of a written step.
 """
 
 from __future__ import annotations
 
 import re
-from typing import Annotated, Literal
+from typing import Annotated, Any, Literal
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
@@ -34,10 +35,16 @@ Coordinate = Annotated[float, Field(ge=-2.0, le=2.0, allow_inf_nan=False)]
 Place = Literal["grasp", "surface", "top", "base", "centre", "left", "right", "near", "far", "point", "here"]
 
 
-class Answer(BaseModel):
-    """Base of all answers: immutable, nothing unknown."""
+def _untitled(schema: dict[str, Any]) -> None:
+    """Take the titles away that say a field's name once more: schemas are part of what is asked, and paid for."""
+    for field in schema.get("properties", {}).values():
+        field.pop("title", None)
 
-    model_config = ConfigDict(frozen=True, extra="forbid")
+
+class Answer(BaseModel):
+    """Base of all answers: immutable, nothing unknown. A form's docstring is shown to the model."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid", json_schema_extra=_untitled)
 
 
 class SeenObject(Answer):
@@ -48,14 +55,14 @@ class SeenObject(Answer):
 
 
 class Seen(Answer):
-    """What the SceneAgent's model reports."""
+    """What is seen on the table."""
 
     objects: Annotated[tuple[SeenObject, ...], Field(max_length=24)]
     summary: Paragraph
 
 
 class Thought(Answer):
-    """What the ReasoningAgent's model decides."""
+    """A judgement, and the next step."""
 
     evidence: Paragraph
     previous: Literal["none", "success", "failure"]
@@ -74,7 +81,7 @@ class Choice(Answer):
 
 
 class WrittenStep(Answer):
-    """One step of a movement; `steps.to_sequence` says what it means."""
+    """One step of a movement."""
 
     do: Annotated[str, BeforeValidator(_tidy), Field(min_length=1, max_length=120)]
     to: Place
@@ -91,7 +98,7 @@ class WrittenStep(Answer):
 
 
 class Written(Answer):
-    """What the ControllerAgent's model writes."""
+    """A movement."""
 
     skill: Annotated[str, BeforeValidator(_tidy), Field(min_length=1, max_length=40)]
     steps: Annotated[tuple[WrittenStep, ...], Field(min_length=1, max_length=16)]
