@@ -34,6 +34,10 @@ CAMERA = "3rd_view_camera"
 FINGER_OFFSET = 0.010
 """m: the benchmark's finger pads are 2 (q - FINGER_OFFSET) apart at finger joint position q."""
 _SEEING, _BLIND = "rgb+depth+segmentation", "none"
+_STILL, _STILL_TURNING = 1e-3, 1e-2
+"""m/s and rad/s: what moves less for a second has come to rest. The benchmark's own limits, which it asks but once."""
+_SETTLE_LIMIT = 150
+"""Control periods after which an object that rocks on is taken as it is."""
 _STEPS_PER_FRAME = 2
 """Of a film: rendering costs more than stepping."""
 
@@ -77,7 +81,11 @@ class SimplerEnv:
         return positions, quaternions
 
     def reset(self, start: int | Start) -> None:
-        """Start an episode with one of the benchmark's layouts, or with the objects somewhere else."""
+        """Start an episode with one of the benchmark's layouts, or with the objects somewhere else.
+
+        In the layouts everything lies still when the episode begins, after a short time to settle. An eggplant from
+        elsewhere may rock for longer: the episode begins when it lies still.
+        """
         if isinstance(start, int) and not 0 <= start < LAYOUTS:
             raise UsageError(f"SimplerEnv has layouts 0 to {LAYOUTS - 1}, not {start}.")
         self.seconds.clear()
@@ -127,13 +135,29 @@ class SimplerEnv:
         self._env.close()
 
     def _place(self, start: int | Start) -> None:
+        """Have the next reset start there."""
+        vars(self._env).pop("_settle", None)
         if isinstance(start, int):
             self._env.xyz_configs, self._env.quat_configs = self._layouts
         else:
-            given = (start.positions, start.quaternions)
             self._env.xyz_configs, self._env.quat_configs = (
-                self._torch.as_tensor(np.asarray(values)[None], dtype=self._torch.float32) for values in given
+                self._torch.as_tensor(np.asarray(values)[None], dtype=self._torch.float32)
+                for values in (start.positions, start.quaternions)
             )
+            self._env._settle = self._settle
+
+    def _settle(self, _duration: float) -> None:
+        """Takes the place of ManiSkill's method, which lets things settle for a fixed time."""
+        thing = self._env.objs[self._env.source_obj_name]
+        still = waited = 0
+        while still * PERIOD < 1.0 and waited < _SETTLE_LIMIT:
+            for _ in range(round(PERIOD * self._env.sim_freq)):
+                self._env.scene.step()
+            speeds = [
+                float(np.linalg.norm(speed[0].cpu())) for speed in (thing.linear_velocity, thing.angular_velocity)
+            ]
+            still = still + 1 if speeds[0] < _STILL and speeds[1] < _STILL_TURNING else 0
+            waited += 1
 
     def _shoot(self) -> None:
         if self.film is not None and self.steps % _STEPS_PER_FRAME == 0:
