@@ -41,7 +41,5 @@ def run_episode(task: str, seed: int, episode: int, actor: str, out: Path | None
 
 def repeat(job: Job, actor: str) -> str:
     """The command that plays the episode again."""
-    if actor != "rules":
-        who = f"--actor {shlex.quote(actor)}"
-        return f"maniagent eval {job.task} {who} --episodes {job.episode + 1} --seeds {job.seed + 1}"
-    return f"maniagent run --task {job.task} --seed {scene_seed(job.seed, job.episode)}"
+    who = "" if actor == "rules" else f" --actor {shlex.quote(actor)}"
+    return f"maniagent run --task {job.task} --seed {scene_seed(job.seed, job.episode)}{who}"
