@@ -1,7 +1,6 @@
 """From agents on models, too, no way leads to the twin's true state."""
 
 import pytest
-from test_honesty import true_state_among
 from test_minds import PUT, Words, act, end, seen
 
 from maniagent import tasks
@@ -12,6 +11,7 @@ from maniagent.envs.tabletop import TabletopEnv
 from maniagent.robots.simulated import SimulatedRobot
 from maniagent.testing import ScriptedModel
 from maniagent.types import RunVerdict
+from test_honesty import true_state_among
 
 
 @pytest.mark.slow
