@@ -125,11 +125,15 @@ def next_subtask(agents: Agents, memory: Memory | None = None) -> Subtask:
 
 
 def remembering(
-    *texts: str, objects: tuple[ObjectInfo, ...] = (), completed: bool = False, verdict: Verdict = Verdict.FAILURE
+    *texts: str,
+    objects: tuple[ObjectInfo, ...] = (),
+    completed: bool = False,
+    reached: int = 2,
+    verdict: Verdict = Verdict.FAILURE,
 ) -> Memory:
     memory = Memory()
     for text in texts:
-        report = ExecutionReport(completed=completed, reached=2, reason="It slipped.", stage="grasp")
+        report = ExecutionReport(completed=completed, reached=reached, reason="It slipped.", stage="grasp")
         memory.add(SubtaskRecord(text, objects, report, verdict, queries=("middle red pepper", "plate")))
     return memory
 
@@ -362,13 +366,34 @@ def test_after_a_failed_grasp_the_same_thing_is_taken_by_the_next_grasp_and_nobo
     assert [grasp.score for grasp in after] == [grasp.score for grasp in (*before[1:], before[0])]
 
 
-def test_where_all_movements_were_made_and_it_failed_the_detector_is_asked_anew() -> None:
+def test_a_target_that_stands_where_it_stood_is_known_and_only_the_other_thing_is_asked_for() -> None:
+    agents, _, detector = made({"objects": [{"reason": "", "number": 2}]})
+    first = agents.objects.locate(MIDDLE, look("middle-pepper"), Memory())
+    memory = remembering(MIDDLE.text, objects=first.objects, completed=True, verdict=Verdict.SUCCESS)
+    left = MIDDLE.model_copy(update={"objects": ("left green pepper", "Plate")})
+    again = agents.objects.locate(left, look("middle-pepper"), memory)
+    assert detector.queries[2:] == ["left green pepper"]
+    np.testing.assert_allclose(again.objects[1].centre, first.objects[1].centre)
+
+
+def test_what_was_moved_is_not_taken_for_what_lies_in_its_old_place() -> None:
+    agents, _, detector = made({"objects": [{"reason": "", "number": 2}]})
+    first = agents.objects.locate(MIDDLE, look("middle-pepper"), Memory())
+    memory = remembering(MIDDLE.text, objects=first.objects, completed=True, verdict=Verdict.SUCCESS)
+    lift = MIDDLE.model_copy(update={"objects": ("middle red pepper",)})
+    agents.objects.locate(lift, look("middle-pepper"), memory)
+    assert detector.queries[2:] == ["middle red pepper"]
+
+
+@pytest.mark.parametrize(("completed", "reached"), [(True, 6), (False, 0)])
+def test_where_all_movements_were_made_or_none_the_wrong_thing_may_have_been_meant(
+    completed: bool, reached: int
+) -> None:
     agents, _, detector = made({"objects": [{"reason": "", "number": 2}]})
     first = agents.objects.locate(MIDDLE, look("middle-pepper"), Memory())
     sought = len(detector.queries)
-    agents.objects.locate(
-        MIDDLE, look("middle-pepper"), remembering(MIDDLE.text, objects=first.objects, completed=True)
-    )
+    memory = remembering(MIDDLE.text, objects=first.objects, completed=completed, reached=reached)
+    agents.objects.locate(MIDDLE, look("middle-pepper"), memory)
     assert len(detector.queries) == 2 * sought
 
 

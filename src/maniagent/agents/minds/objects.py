@@ -14,11 +14,10 @@ from ...perception.detectors.pictures import draw_marks
 from ...perception.detectors.protocol import Match
 from ...perception.identity import same_thing
 from ...perception.rig import Rig
-from ...perception.segmentation import TableView
 from ...perception.segments import Segment
 from ...perception.viewpoint import Viewpoint
-from ...types import BoolArray, Observation, Subtask, SubtaskRecord, Verdict
-from ..locating import assemble, find_tried, last_tried, offer_grasps
+from ...types import BoolArray, Observation, Subtask
+from ..locating import assemble, offer_grasps
 from ..memory import Memory
 from ..protocols import Located
 from ..rules.controller import direction_of
@@ -26,6 +25,7 @@ from ..rules.language import parse_instruction
 from .answers import Choice
 from .eyes import Eyes
 from .prompts import Prompt
+from .recognition import attempts_at, recognise
 from .telling import fenced, one_line
 
 MOST_ALIKE = 12
@@ -58,30 +58,17 @@ class MindObjectAgent:
 
         """
         view = self._eyes.look(observation)
-        attempts = _attempts(subtask, memory)
-        again = self._find_again(subtask.objects, attempts, view, observation)
-        found = self._resolve(subtask, observation, again)
+        known = {
+            i: Match.of(subtask.objects[i], view.segments[k], 1.0, observation)
+            for i, k in recognise(subtask, memory, view.segments).items()
+        }
+        found = self._resolve(subtask, observation, known)
         moved = found[0].segment
         way = _way(subtask.text, moved, Viewpoint.of(observation))
-        grasps = offer_grasps(subtask.objects[0], moved, view, self._rig, attempts, way)
+        grasps = offer_grasps(subtask.objects[0], moved, view, self._rig, attempts_at(subtask, memory), way)
         chosen = [(q, match.segment, match.detection) for q, match in zip(subtask.objects, found, strict=True)]
         others = [s for s in view.segments if not any(_covers(match.segment, s) for match in found)]
         return assemble(chosen, grasps, [(_name_of(s, memory), s) for s in others])
-
-    def _find_again(
-        self, queries: Sequence[str], attempts: Sequence[SubtaskRecord], view: TableView, observation: Observation
-    ) -> dict[int, Match]:
-        """What an attempt that broke off had found already, by its looks: nobody need be asked for it again."""
-        if not attempts or attempts[-1].outcome.completed:
-            return {}
-        matches = {}
-        for i, query in enumerate(queries):
-            tried = last_tried(attempts, i)
-            k = find_tried(tried, i, view.segments) if tried is not None else None
-            if k is not None:
-                matches[i] = Match.of(query, view.segments[k], 1.0, observation)
-        different = len({id(match.segment) for match in matches.values()}) == len(matches)
-        return matches if different else {}
 
     def _resolve(self, subtask: Subtask, observation: Observation, known: dict[int, Match]) -> list[Match]:
         """One match per query: those that are known, the only ones, then the VLM's choice among several."""
@@ -118,16 +105,6 @@ class MindObjectAgent:
                 f"None of {len(shown)} things found is the {one_line(query)}: {one_line(choice.reason)}"
             )
         return shown[choice.number - 1][0]
-
-
-def _attempts(subtask: Subtask, memory: Memory) -> tuple[SubtaskRecord, ...]:
-    """The unbroken run of latest attempts with the same objects: a model may word the same thing in another way."""
-    tail: list[SubtaskRecord] = []
-    for record in reversed(memory.records):
-        if record.queries != subtask.objects or record.verdict is Verdict.SUCCESS:
-            break
-        tail.append(record)
-    return tuple(reversed(tail))
 
 
 def _way(text: str, moved: Segment, viewpoint: Viewpoint) -> FloatArray | None:
