@@ -8,6 +8,7 @@ from scipy.spatial import ConvexHull
 from scipy.spatial.transform import Rotation
 
 from maniagent.envs.simpler import Start, draw_start
+from maniagent.envs.simpler.starts import APART
 from maniagent.errors import UsageError
 from maniagent.evaluation.poses import GRID, OFF_GRID, Poses
 from maniagent.geometry import FloatArray

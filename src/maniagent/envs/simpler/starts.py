@@ -31,8 +31,8 @@ def draw_start(positions: FloatArray, quaternions: FloatArray, rng: np.random.Ge
     """Draw a start, given the benchmark's layouts of a task: (P, 2, 3) positions, m, and (Q, 2, 4) quaternions.
 
     Positions are uniform over the convex hulls of the layouts' positions, the two objects at least APART (in the
-    plane), or as far apart as in the nearest layout. Each object has the attitude of one of the layouts, turned about the vertical
-    by a uniform angle. What no layout ever moves (the eggplant's basket) stays where and as it is.
+    plane), or as far apart as in the nearest layout. Each object has the attitude of one of the layouts, turned about
+    the vertical by a uniform angle. What no layout ever moves (the eggplant's basket) stays where and as it is.
     """
     apart = min(APART, np.linalg.norm(positions[:, 0, :2] - positions[:, 1, :2], axis=1).min())
     areas = [_Area(positions[:, i]) for i in range(2)]
