@@ -87,7 +87,8 @@ class MindObjectAgent:
 
     def _pick(self, subtask: Subtask, query: str, alikes: Sequence[Match], observation: Observation) -> Match:
         """Ask which of several things is meant, by their numbers on the main picture."""
-        shown = [(m, mask) for m in alikes if (mask := m.segment.masks.get(observation.main)) is not None][:MOST_ALIKE]
+        masks = [(match, match.segment.masks.get(observation.main)) for match in alikes]
+        shown = [(match, mask) for match, mask in masks if mask is not None and mask.any()][:MOST_ALIKE]
         if not shown:
             return alikes[0]
         instructions, question = self._prompt.filled(
