@@ -28,7 +28,7 @@ class Spot(BaseModel):
 
 GOOD = '{"name": "cup", "x": 0.25, "tags": []}'
 CUP = Spot(name="cup", x=0.25)
-QUICK = Patience(timeout=5.0, first_wait=0.01, retries=2, repairs=1)
+QUICK = Patience(timeout=30.0, first_wait=0.01, retries=2, repairs=1)
 KEY = "sk-very-secret-0123456789"
 
 

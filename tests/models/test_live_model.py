@@ -148,8 +148,10 @@ def test_what_passes_is_tried_again(status: int) -> None:
         Raw(body='{"choices": null}'),
         Raw(body='"hm"', headers={"Content-Type": "text/plain"}),
         Raw(status=204),
+        Raw(body="[" * 100_000),
+        Raw(body="no gzip", headers={"Content-Encoding": "gzip"}),
     ],
-    ids=["html", "list", "no choices", "null", "text", "empty"],
+    ids=["html", "list", "no choices", "null", "text", "empty", "deep", "encoding"],
 )
 def test_a_body_that_is_not_the_protocols_is_tried_again_and_told(garbage: Raw) -> None:
     assert ask(lambda _: garbage, says(GOOD))[0] == CUP
@@ -179,7 +181,7 @@ def test_no_answer_takes_longer_than_it_may(script: Script) -> None:
     started = time.monotonic()
     answer, asked, _ = ask(script, patience=QUICK.model_copy(update={"timeout": 0.5}))
     assert isinstance(answer, ModelFailure)
-    assert "no whole answer within 0.5 s" in str(answer)
+    assert "no whole answer within" in str(answer)
     assert (len(asked), time.monotonic() - started < 2.0) == (1, True)
 
 
@@ -234,6 +236,13 @@ def test_a_key_that_a_server_says_is_not_recorded(monkeypatch: pytest.MonkeyPatc
     answer, _, exchange = ask(says(GOOD.replace("cup", KEY)))
     assert answer.name == "[key]"
     assert KEY not in repr(exchange)
+
+
+def test_no_part_of_a_key_is_left_where_a_long_message_is_cut(monkeypatch: pytest.MonkeyPatch) -> None:
+    monkeypatch.setenv("MANIAGENT_API_KEY", KEY)
+    for length in range(280, 300):
+        answer, _, _ = ask(fails(401, "x" * length + KEY))
+        assert KEY[:3] not in str(answer)
 
 
 def test_no_other_key_goes_to_a_server_of_ones_own(monkeypatch: pytest.MonkeyPatch) -> None:

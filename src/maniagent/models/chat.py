@@ -116,20 +116,20 @@ class LiveModel:
 
     def _reply(self, prompt: Prompt, notes: _Notes) -> Reply:
         """One round: the answer, in the other mode where the server refuses the first."""
+        deadline = time.monotonic() + self._patience.timeout
         try:
-            return self._persist(prompt, self._mode, notes)
+            return self._persist(prompt, self._mode, deadline, notes)
         except Fault as fault:
             refusal = fault
         if refusal.kind == "refused" and self._may_fall_back and self._mode != "prompt":
             with contextlib.suppress(Fault):  # then the way of asking wasn't the reason: the first fault says more
-                reply = self._persist(prompt, "prompt", notes)
+                reply = self._persist(prompt, "prompt", deadline, notes)
                 self._mode = "prompt"
                 return reply
         raise ModelFailure(self._told(refusal))
 
-    def _persist(self, prompt: Prompt, mode: Mode, notes: _Notes) -> Reply:
+    def _persist(self, prompt: Prompt, mode: Mode, deadline: float, notes: _Notes) -> Reply:
         """Send, and send again after faults that pass, until the time is up; raises Fault."""
-        deadline = time.monotonic() + self._patience.timeout
         for attempt in range(1, self._patience.retries + 2):
             try:
                 return self._attempt(prompt, mode, deadline - time.monotonic(), notes)

@@ -17,7 +17,7 @@ from .transport import TooLong, missing_extra, open_client
 if TYPE_CHECKING:
     from pydantic_ai.models import Model
 
-_UNREADABLE = (TypeError, ValueError, AttributeError, LookupError)
+_UNREADABLE = (TypeError, ValueError, AttributeError, LookupError, RecursionError)
 """What client libraries raise on bodies that aren't what they trust a server to send."""
 _SHORTEST_SECRET = 8
 """Characters; a shorter key is a placeholder for a local server, and may be a word of an answer."""
@@ -72,12 +72,12 @@ class Endpoint:
         except (AgentRunError, TooLong) as error:
             fault = to_fault(error, timeout)
         except UserError as error:  # what the library knows the model can't do
-            fault = Fault("final", one_line(str(error)))
+            fault = Fault("final", str(error))
         except (HTTPError, *_UNREADABLE) as error:
-            reason = one_line(f"{type(error).__name__}: {error}")
-            fault = Fault("passing", f"the server's answer can't be read ({reason})", sent=True)
+            reason = f"the server's answer can't be read ({type(error).__name__}: {error})"
+            fault = Fault("passing", reason, sent=True)
         if fault is not None:  # raised out here, so that no request, and so no key, hangs on it
-            raise Fault(fault.kind, self._without_key(str(fault)), fault.retry_after, sent=fault.sent)
+            raise Fault(fault.kind, one_line(self._without_key(str(fault))), fault.retry_after, sent=fault.sent)
         if response.finish_reason == "content_filter":
             raise Fault("final", "the provider's content filter withheld the answer", sent=True)
         reply = to_reply(response)

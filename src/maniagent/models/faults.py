@@ -17,7 +17,7 @@ _LONGEST_REASON = 300
 
 
 class Fault(Exception):
-    """A request that failed; the message says why, in words that may be shown."""
+    """A request that failed; the message says why."""
 
     def __init__(self, kind: FaultKind, reason: str, retry_after: float | None = None, *, sent: bool = False) -> None:
         super().__init__(reason)
@@ -55,10 +55,10 @@ def to_fault(error: AgentRunError | TooLong, timeout: float) -> Fault:
 
 
 def _reason(error: AgentRunError | TooLong) -> str:
-    """One line: the HTTP status where there is one, and the server's own words."""
+    """The HTTP status where there is one, and the server's own words."""
     status = getattr(error, "status_code", None)
     words = _words(getattr(error, "body", None)) or ("" if status else _with_cause(error))
-    return ": ".join(filter(None, (status and f"HTTP {status}", one_line(words))))
+    return ": ".join(filter(None, (status and f"HTTP {status}", words)))
 
 
 def one_line(words: str) -> str:

@@ -31,7 +31,7 @@ class Patience(BaseModel):
 
         `asked` is what the server asked for, in seconds.
         """
-        if attempt > self.retries or (asked is not None and asked > self.longest_wait):
+        if attempt > self.retries or (asked is not None and not asked <= self.longest_wait):  # nan, too, is too long
             return None
         backoff = min(self.first_wait * 2 ** min(attempt - 1, 30), self.longest_wait)
         return max(asked or 0.0, backoff * random.uniform(0.75, 1.25))  # noqa: S311 - not for secrets
