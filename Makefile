@@ -6,7 +6,7 @@ DEMO := runs/demo
 JOBS ?= 2
 
 .DEFAULT_GOAL := help
-.PHONY: help demo install dev test check format bench clean
+.PHONY: help demo install dev simpler test check format bench clean
 .DELETE_ON_ERROR:
 
 help: ## Say what can be made
@@ -21,7 +21,10 @@ install: $(VENV)/.installed ## Make .venv and see to it that camera images can b
 
 dev: $(VENV)/.installed-dev ## The same, with what the checks need
 
-test: check ## Format, lint, types, then all tests
+simpler: dev ## Where SimplerEnv's assets are here, see to it that it runs
+	scripts/simpler.sh $(BIN)/python
+
+test: check simpler ## Format, lint, types, then all tests
 	$(BIN)/python -m pytest -n $(JOBS)
 
 check: dev ## Format, lint, types

@@ -90,8 +90,9 @@ def propose_grasps(
     found = _sections(centres, surface, segment, gripper, tuning)
     found = found.take(_closes(found, gripper, tuning))
     roomy = _with_room(found, grid, gripper, tuning)
-    if not len(roomy.tip):  # beside a wall one finger goes close to the object, and pushes it to the other
-        roomy = _with_room(_moved_aside(found, grid, gripper, tuning), grid, gripper, tuning)
+    if not _below_middle(roomy, segment).any():  # beside a wall one finger goes close by and pushes it to the other
+        aside = _with_room(_moved_aside(found, grid, gripper, tuning), grid, gripper, tuning)
+        roomy = _Candidates.concatenate([roomy, aside])
     return _best(roomy, surface, segment, gripper, tuning)
 
 
@@ -274,6 +275,11 @@ def _highest(found: _Candidates, v: FloatArray, half_width: float, grid: HeightM
     return grid.height[cells[..., 0], cells[..., 1]].max(axis=(1, 2), initial=0.0)
 
 
+def _below_middle(found: _Candidates, segment: Segment) -> BoolArray:
+    """(N,) whether the fingertips reach below half the object's height."""
+    return found.tip < segment.support_z + segment.extent[2] / 2
+
+
 def _squareness(found: _Candidates, surface: FloatArray) -> FloatArray:
     """(N,) in [0, 1]: how well the fingers close across what runs through the grasp: a wall, a rim, a handle.
 
@@ -309,7 +315,10 @@ def _scores(
     narrow = np.clip(float(segment.extent[1]) / np.maximum(found.width, 1e-3), 0.0, 1.0)
     square = _squareness(found, surface) * narrow**2 / (1.0 + found.slope**2)
     firm = np.clip((found.width - gripper.closed_gap) / max(tuning.firm, 1e-6), 0.0, 1.0)
-    return firm * square * (0.4 + 0.6 * depth) * (1.0 - 0.7 * np.clip(off_centre, 0.0, 1.0)) * (0.8 + 0.2 * stretch)
+    # What is round slips out below fingertips that stay above its middle.
+    low = np.where(_below_middle(found, segment), 1.0, 0.5)
+    held = low * firm * square
+    return held * (0.4 + 0.6 * depth) * (1.0 - 0.7 * np.clip(off_centre, 0.0, 1.0)) * (0.8 + 0.2 * stretch)
 
 
 def _best(

@@ -61,8 +61,13 @@ class HeightMap:
         return lab
 
 
-def build_height_map(views: Sequence[ViewPoints], workspace: Workspace, cell: float = 0.002) -> HeightMap:
-    """Fuse the foreground of all views; gaps of a few cells are closed from their neighbours."""
+def build_height_map(
+    views: Sequence[ViewPoints], workspace: Workspace, cell: float = 0.002, *, trust_bare: bool = False
+) -> HeightMap:
+    """Fuse the foreground of all views; gaps of a few cells are closed from their neighbours.
+
+    With `trust_bare` a gap through which the table is seen is none: two things side by side.
+    """
     origin = (workspace.x[0], workspace.y[0])
     shape = (
         round((workspace.x[1] - workspace.x[0]) / cell),
@@ -85,23 +90,25 @@ def build_height_map(views: Sequence[ViewPoints], workspace: Workspace, cell: fl
     for view in views:
         index = ((view.bare - origin) / np.float32(cell)).astype(np.int32)
         bare[np.clip(index[:, 0], 0, shape[0] - 1), np.clip(index[:, 1], 0, shape[1] - 1)] = True
-    bare = cv2.dilate(bare.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0  # the sample leaves cells out
-    return _close_gaps(HeightMap(origin, cell, height, rgb, occupied, bare & ~occupied))
+    return _close_gaps(HeightMap(origin, cell, height, rgb, occupied, bare & ~occupied), trust_bare)
 
 
-def _close_gaps(grid: HeightMap) -> HeightMap:
+def _close_gaps(grid: HeightMap, trust_bare: bool) -> HeightMap:
     grid = _without_specks(grid)
     window = (5, 5)
     closed = cv2.morphologyEx(grid.occupied.astype(np.uint8), cv2.MORPH_CLOSE, np.ones(window, np.uint8)) > 0
+    if trust_bare:
+        closed &= ~grid.bare
     gaps = closed & ~grid.occupied
     weight = cv2.blur(grid.occupied.astype(np.float32), window)
     scale = 1.0 / np.maximum(weight, 1e-6)
     height, rgb = grid.height.copy(), grid.rgb.copy()
     height[gaps] = (cv2.blur(grid.height, window) * scale)[gaps]
     rgb[gaps] = np.clip(cv2.blur(grid.rgb.astype(np.float32), window) * scale[..., None], 0, 255)[gaps]
+    bare = cv2.dilate(grid.bare.astype(np.uint8), np.ones((3, 3), np.uint8)) > 0  # the sample leaves cells out
     # One pixel's noise mustn't make a peak of the topmost surface.
     smooth = np.where(closed, cv2.medianBlur(height, 3), np.float32(0))
-    return HeightMap(grid.origin, grid.cell, smooth, rgb, closed, grid.bare & ~closed)
+    return HeightMap(grid.origin, grid.cell, smooth, rgb, closed, bare & ~closed)
 
 
 def _without_specks(grid: HeightMap) -> HeightMap:

@@ -16,8 +16,12 @@ from .regions import FLAT, LEVEL, SMALL, STOREY, Border, Labels, RegionGraph, re
 
 TINY = 1.8e-4
 """m^2; a part, never an object."""
+PART, LIMB = 1.2e-3, 1e-2
+"""m^2; no stem or leaf, and no head, is larger: the rims and bottoms of a sink are."""
 ELONGATED = 2.4
 """Length over width from which end-to-end parts may make one tool, fruit or pen."""
+SAME_ANGLE = 8.0
+"""Degrees between hues that are one, however pale."""
 REACH = 8
 """Cells from a crumb within which the object it belongs to is looked for."""
 
@@ -31,11 +35,16 @@ def _shaded_side(border: Border) -> bool:
     return border.same_hue and border.colourful and abs(border.step) < 0.012 and border.share > 0.25
 
 
+def _washed_out(border: Border) -> bool:
+    """The side of a glossy thing that faces the light: of the same hue, paler, and all along the other side."""
+    return border.colourful and border.hue_angle < SAME_ANGLE and border.share > 0.35 and abs(border.step) < 0.006
+
+
 def _limb(border: Border) -> bool:
     """Head and body: of one colour, side by side, whatever their heights. What stands ON a thing has no outer side."""
     one_colour = border.same_colour or (border.same_hue and border.colourful)
     beside = border.share > 0.1 and border.outer > 0.25 * border.perimeter
-    return one_colour and beside and not border.lies_on_cloth
+    return one_colour and beside and not border.lies_on_cloth and border.small.area < LIMB
 
 
 def _vessel(border: Border) -> bool:
@@ -59,7 +68,7 @@ def _cloth(border: Border) -> bool:
 def _attachment(border: Border) -> bool:
     """A stem, a beak, a leaf: tiny, or small and at the edge of what it grows from, not on it."""
     small, large = border.small.area, border.large.area
-    if border.step > STOREY:
+    if border.step > STOREY or small > PART:
         return False
     if small < TINY:
         return border.share > 0.05
@@ -84,6 +93,7 @@ def _end_to_end(border: Border) -> bool:
 _RULES: tuple[Callable[[Border], bool], ...] = (
     _one_surface,
     _shaded_side,
+    _washed_out,
     _vessel,
     _limb,
     _cloth,

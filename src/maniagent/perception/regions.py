@@ -84,6 +84,12 @@ class Border:
         return same_hue(self.small, self.large)
 
     @property
+    def hue_angle(self) -> float:
+        """Degrees between the two hues in the a, b plane."""
+        a, b = (part.colour[1:] - 128.0 for part in (self.small, self.large))
+        return float(np.degrees(np.arccos(np.clip(a @ b / (np.linalg.norm(a) * np.linalg.norm(b) + 1e-9), -1.0, 1.0))))
+
+    @property
     def colourful(self) -> bool:
         """Both have a hue at all: among greys, lightness is all there is to tell things apart."""
         return all(np.linalg.norm(part.colour[1:] - 128.0) > SAME_HUE for part in (self.small, self.large))

@@ -57,7 +57,7 @@ def segment(observation: Observation, rig: Rig) -> TableView:
 
     """
     views = foreground(observation, rig.covers_robot, rig.workspace, rig.tuning)
-    grid = build_height_map(views, rig.workspace)
+    grid = build_height_map(views, rig.workspace, trust_bare=rig.tuning.foot is not None)
     labels = merge_regions(split_regions(grid), grid)
     supports = find_supports(labels, grid)
     segments = cut_segments(views, labels, supports, grid)

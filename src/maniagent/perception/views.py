@@ -32,6 +32,9 @@ class Tuning:
 
     height: float = 0.008
     """m above the table plane from which a point belongs to a thing, whatever its colour."""
+    foot: float | None = None
+    """m from which a point belongs to the thing it is connected to in the image; None: from `height`. Only exact depth
+    allows for one; then a gap between two points is no noise either."""
     chroma: float = 11.0
     """Distance in the a, b plane of CIE Lab from the table's colour that makes a thing, however flat."""
     bleeding: float = 0.4
@@ -98,7 +101,10 @@ def _view_foreground(
     a, b, c = _fit_table(frame.name, np.stack([x[coarse][chosen], y[coarse][chosen], z[coarse][chosen]], -1), tuning)
     height = z - (a * x + b * y + c)
     coloured = _off_colour(frame.rgb, inside & (np.abs(height) < 0.004), tuning)
-    pixels = np.flatnonzero(inside & ((height > tuning.height) | (coloured & (height > -tuning.height))))
+    things = inside & ((height > tuning.height) | (coloured & (height > -tuning.height)))
+    if tuning.foot is not None:
+        things = _connected(things, inside & (height > tuning.foot))
+    pixels = np.flatnonzero(things)
     points = np.stack([x.ravel()[pixels], y.ravel()[pixels], height.ravel()[pixels]], axis=-1)
     sample = (slice(None, None, 2), slice(None, None, 2))
     on_table = inside[sample] & (np.abs(height[sample]) <= tuning.height) & ~coloured[sample]
@@ -119,6 +125,16 @@ def _base_coordinates(frame: CameraFrame, depth: NDArray[np.float32]) -> NDArray
     right, down, forward, origin = frame.T_base_camera[:3, :, None, None].astype(np.float32).swapaxes(0, 1)
     rays = right * u.astype(np.float32) + (down * v.astype(np.float32)[:, None] + forward)
     return rays * depth + origin
+
+
+def _connected(sure: BoolArray, possible: BoolArray) -> BoolArray:
+    """What is sure (H, W), and what is possible and connected to it by more than a line of pixels."""
+    broad = cv2.morphologyEx((possible & ~sure).astype(np.uint8), cv2.MORPH_OPEN, np.ones((2, 2), np.uint8)) > 0
+    _, islands = cv2.connectedComponents((sure | broad).astype(np.uint8), connectivity=8)
+    kept = np.zeros(int(islands.max()) + 1, bool)
+    kept[np.unique(islands[sure])] = True
+    kept[0] = False
+    return np.asarray(kept[islands])
 
 
 def _within(values: NDArray[np.float32], bounds: tuple[float, float]) -> BoolArray:

@@ -42,7 +42,7 @@ HOME_STEPS = 12
 
 WORKSPACE = Workspace(x=(0.08, 0.50), y=(-0.30, 0.30))
 # The depth is exact. The colours of what is no object come from a photograph, which says nothing about the table.
-TUNING = Tuning(height=0.0015, chroma=math.inf, brighter=math.inf, darker=0.0)
+TUNING = Tuning(height=0.003, foot=0.0015, chroma=math.inf, brighter=math.inf, darker=0.0)
 GRIPPER = GripperShape(  # measured on the collision meshes of the benchmark's arm
     max_opening=0.054,
     min_opening=0.054,

@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 from collections.abc import Sequence
+from dataclasses import replace
 
 import numpy as np
 
@@ -97,6 +98,8 @@ def _judge_shift(record: SubtaskRecord, moved: ObjectInfo, now: Sequence[ObjectI
 def _judge_relation(command: Command, record: SubtaskRecord, moved: ObjectInfo, now: Sequence[ObjectInfo]) -> Judgement:
     # The target is looked for near its old place; where it is hidden now (a block under a block), its old place counts.
     target = find_again(record.objects[1], now, SEARCH) or record.objects[1]
+    # What lies in a basket hides its bottom, so that its rim seems to be all of it.
+    target = replace(target, surface_z=min(target.surface_z, record.objects[1].surface_z))
     holds = _rests_on if command.relation in (Relation.ON, Relation.IN) else _lies_beside
     where = f"{command.relation} the {record.objects[1].name}"
     alike = [thing for thing in now if same_thing(moved, thing) and not _is(thing, target)]
