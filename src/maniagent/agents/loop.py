@@ -39,7 +39,7 @@ class Budget:
     """How long a run may go on."""
 
     turns: int = 20
-    seconds: float = 900.0
+    seconds: float = 3600.0
     """Wall time."""
     failed_looks: int = 3
     """Turns in a row that may end without an attempt (nothing seen, nothing understood) before the run gives up."""
