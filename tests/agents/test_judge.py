@@ -71,6 +71,12 @@ def test_a_thing_beside_the_target_is_not_on_it() -> None:
     assert "No pepper is seen on the plate" in evidence
 
 
+def test_what_lies_in_a_basket_may_hide_its_bottom() -> None:
+    basket = replace(PLATE, surface_z=0.01, extent=[0.20, 0.14, 0.10], centre=[0.30, -0.10, 0.05])
+    rim = replace(basket, surface_z=0.10)
+    assert verdict(put(Relation.IN), tried(PEPPER, basket), rim, at(PEPPER, 0.31, -0.09, 0.05)) is Verdict.SUCCESS
+
+
 def test_a_thing_under_the_target_is_not_on_it() -> None:
     flat = at(PEPPER, 0.30, -0.10, extent=[0.10, 0.03, 0.004])
     assert verdict(put(Relation.ON), tried(PEPPER, PLATE), PLATE, flat) is Verdict.FAILURE

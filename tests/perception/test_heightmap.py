@@ -2,6 +2,8 @@
 
 from __future__ import annotations
 
+from dataclasses import replace
+
 import numpy as np
 import pytest
 from hypothesis import given
@@ -49,6 +51,19 @@ def test_a_surface_stands_where_its_points_are() -> None:
     np.testing.assert_allclose(np.ptp(xy, axis=0) + CELL, 0.03, atol=CELL)
     assert np.median(grid.height[grid.occupied]) == pytest.approx(0.04)
     assert (grid.rgb[grid.occupied] == (200, 30, 30)).all()
+
+
+def test_a_gap_through_which_the_table_is_seen_parts_two_things() -> None:
+    left, right = square(0.19, 0.0, 0.03, side=0.02), square(0.216, 0.0, 0.03, side=0.024)
+    between = np.column_stack([np.full(40, 0.202), np.linspace(-0.02, 0.02, 40)])
+    both = view(np.concatenate([left, right]))
+    seen = replace(both, bare=between.astype(np.float32))
+    grid = build_height_map([seen], WORKSPACE, CELL, trust_bare=True)
+    row, column = grid.cells(np.array([0.202, 0.0]))
+    assert not grid.occupied[row, column]
+    assert grid.bare[row, column]
+    assert build_height_map([both], WORKSPACE, CELL, trust_bare=True).occupied[row, column], "a hidden gap is closed"
+    assert build_height_map([seen], WORKSPACE, CELL).occupied[row, column], "noisy depth isn't trusted"
 
 
 def test_the_topmost_surface_wins_whichever_view_saw_it_first() -> None:

@@ -96,6 +96,12 @@ def test_the_shaded_side_belongs_to_the_lit_one(table: Table) -> None:
     assert table.count() == 1
 
 
+def test_the_pale_side_of_a_glossy_thing_belongs_to_it(table: Table) -> None:
+    table.box(0.0, -0.006, 0.08, 0.012, 0.024, (110, 190, 40))
+    table.box(0.0, 0.003, 0.08, 0.006, 0.022, (196, 232, 160))
+    assert table.count() == 1
+
+
 def test_a_stem_belongs_to_what_it_grows_from(table: Table) -> None:
     table.box(0.0, 0.0, 0.04, 0.04, 0.03, RED)
     table.box(0.03, 0.0, 0.02, 0.015, 0.02, GREEN)
@@ -146,6 +152,18 @@ def test_a_cloth_parted_by_a_fork_is_one_cloth(table: Table) -> None:
     merged = table.merged()
     assert len(np.unique(merged[table.labels > 0])) == 2
     assert (merged[table.labels == fork] == fork).all()
+
+
+def test_the_parts_of_a_sink_are_no_limbs_of_each_other(table: Table) -> None:
+    table.box(-0.06, 0.0, 0.11, 0.22, 0.07, GREY)
+    table.box(0.055, 0.0, 0.12, 0.22, 0.12, GREY)
+    assert table.count() == 2
+
+
+def test_a_fruit_level_with_a_rim_is_no_part_of_it(table: Table) -> None:
+    table.box(0.0, -0.05, 0.2, 0.1, 0.1, YELLOW)
+    table.box(0.02, 0.015, 0.06, 0.03, 0.1, RED)
+    assert table.count() == 2
 
 
 # Two things -----------------------------------------------------------------------------------------------------------

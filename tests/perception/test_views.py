@@ -88,6 +88,19 @@ def test_a_flat_thing_is_seen_by_its_colour_alone() -> None:
     assert len(plain.points) == 0
 
 
+def test_exact_depth_sees_the_foot_of_a_thing_and_no_film_beside_it() -> None:
+    """A wedge that starts flat: its foot counts where something high is connected to it."""
+    frame = shot(box=np.array([[0.25, -0.02, 0.0], [0.29, 0.04, 0.02]]))
+    foot = shot(box=np.array([[0.25, 0.04, 0.0], [0.29, 0.06, 0.002]])).depth
+    film = shot(box=np.array([[0.25, -0.10, 0.0], [0.29, -0.06, 0.002]])).depth
+    frame = replace(frame, depth=np.minimum(frame.depth, np.minimum(foot, film)), rgb=np.full_like(frame.rgb, 128))
+    only_height = {"height": 0.003, "chroma": np.inf, "brighter": np.inf, "darker": 0.0}
+    (plain,), (exact,) = see(frame, **only_height), see(frame, **only_height, foot=0.0015)
+    assert plain.points[:, 1].max() == pytest.approx(0.04, abs=0.003)
+    assert exact.points[:, 1].max() == pytest.approx(0.06, abs=0.003)
+    assert exact.points[:, 1].min() == pytest.approx(-0.02, abs=0.003), "the film stays table"
+
+
 @pytest.mark.parametrize("light", [0.5, 0.75, 1.2])
 def test_a_shadow_is_no_thing(light: float) -> None:
     shaded = np.array([[0.2, -0.08, 0.0], [0.32, 0.04, 1e-4]])
