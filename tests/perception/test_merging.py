@@ -102,6 +102,24 @@ def test_the_pale_side_of_a_glossy_thing_belongs_to_it(table: Table) -> None:
     assert table.count() == 1
 
 
+def spoon(table: Table, gap: float, *, tip: float = 0.008, aside: float = 0.0) -> None:
+    """A handle that narrows to a tip, and a head beyond a neck that isn't seen."""
+    table.box(0.04, 0.0, 0.06, 0.022, 0.024, GREEN)
+    table.box(0.0, 0.0, 0.02, tip, 0.006, GREEN)
+    table.box(-0.01 - gap - 0.02, aside, 0.04, 0.03, 0.008, WHITE)
+
+
+def test_a_spoon_whose_neck_is_too_flat_to_be_seen_is_one(table: Table) -> None:
+    spoon(table, gap=0.008)
+    assert table.count() == 1
+
+
+@pytest.mark.parametrize("parted", [{"gap": 0.02}, {"gap": 0.008, "aside": 0.014}, {"gap": 0.008, "tip": 0.022}])
+def test_what_is_not_at_the_thin_end_of_a_handle_is_no_head(table: Table, parted: dict[str, float]) -> None:
+    spoon(table, **parted)
+    assert table.count() == 2
+
+
 def test_a_stem_belongs_to_what_it_grows_from(table: Table) -> None:
     table.box(0.0, 0.0, 0.04, 0.04, 0.03, RED)
     table.box(0.03, 0.0, 0.02, 0.015, 0.02, GREEN)

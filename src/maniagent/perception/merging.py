@@ -7,12 +7,13 @@ small, a cap continues its pen. Objects that touch side by side, or lie on one a
 from __future__ import annotations
 
 from collections.abc import Callable
-from itertools import combinations
+from itertools import combinations, permutations
 
 import numpy as np
+from scipy.spatial.distance import cdist
 
 from .heightmap import HeightMap
-from .regions import FLAT, LEVEL, SMALL, STOREY, Border, Labels, RegionGraph, rectangle, same_hue
+from .regions import FLAT, LEVEL, SMALL, STOREY, Border, Labels, Region, RegionGraph, rectangle, same_hue
 
 TINY = 1.8e-4
 """m^2; a part, never an object."""
@@ -20,6 +21,10 @@ PART, LIMB = 1.2e-3, 1e-2
 """m^2; no stem or leaf, and no head, is larger: the rims and bottoms of a sink are."""
 ELONGATED = 2.4
 """Length over width from which end-to-end parts may make one tool, fruit or pen."""
+NECK = 0.012
+"""m; a spoon's neck that lies too flat to be seen is no longer, and what it joins ends no higher."""
+ON_AXIS = 0.007
+"""m by which a spoon's head may be off the axis of its handle."""
 SAME_ANGLE = 8.0
 """Degrees between hues that are one, however pale."""
 REACH = 8
@@ -113,6 +118,8 @@ def merge_regions(labels: Labels, grid: HeightMap) -> Labels:
         graph.merge([pair])
     while pair := _stray(graph):
         graph.merge([pair])
+    while pair := _necked(graph):
+        graph.merge([pair])
     return graph.labels
 
 
@@ -156,3 +163,30 @@ def _stray(graph: RegionGraph) -> tuple[int, int] | None:
             if len(others):
                 return int(np.bincount(others).argmax()), label
     return None
+
+
+def _necked(graph: RegionGraph) -> tuple[int, int] | None:
+    """A handle and the head beyond its thin end, whose neck lies too flat to be seen."""
+    touching = {pair for pair, _ in graph.borders()}
+    for (a, handle), (b, head) in permutations(graph.regions.items(), 2):
+        apart = (a, b) not in touching and (b, a) not in touching
+        if apart and TINY < head.area < 1.5 * handle.area < 6 * SMALL and _points_at(handle, head, graph):
+            return a, b
+    return None
+
+
+def _points_at(handle: Region, head: Region, graph: RegionGraph) -> bool:
+    """Whether a long region narrows towards another that lies on its axis, a neck's length away, both ends low."""
+    length, width, _ = rectangle(handle.cells, graph.cell)
+    if length < ELONGATED * width:
+        return False
+    distances = cdist(handle.cells, head.cells)
+    i, j = np.unravel_index(int(distances.argmin()), distances.shape)
+    end, start = handle.cells[i], head.cells[j]
+    if distances.min() * graph.cell > NECK or max(graph.height_at(end), graph.height_at(start)) > NECK:
+        return False
+    centred = handle.cells - handle.cells.mean(axis=0)
+    along, across = np.linalg.svd(centred, full_matrices=False)[2]
+    off_axis = abs((head.cells.mean(axis=0) - handle.cells.mean(axis=0)) @ across) * graph.cell
+    tip = centred[np.abs((handle.cells - end) @ along) * graph.cell < NECK]
+    return bool(off_axis < ON_AXIS and np.ptp(tip @ across) * graph.cell < 0.75 * width)

@@ -109,6 +109,7 @@ class RegionGraph:
 
     def __init__(self, labels: Labels, grid: HeightMap) -> None:
         self.labels = labels.copy()
+        self.cell = grid.cell
         self._grid = grid
         self._lab = grid.lab
         self._basins, self._levels = find_basins(grid)
@@ -143,6 +144,10 @@ class RegionGraph:
         if self._borders is None:
             self._borders = list(self._find_borders())
         return self._borders
+
+    def height_at(self, cell: NDArray[np.intp]) -> float:
+        """m, of the surface at a cell (row, column)."""
+        return float(self._grid.height[cell[0], cell[1]])
 
     def carries(self, low: int, high: int) -> bool:
         """Whether one region may be part of what the other stands on: lower by a storey, and a corner or all around."""
