@@ -107,7 +107,7 @@ def _view_foreground(
     pixels = np.flatnonzero(things)
     points = np.stack([x.ravel()[pixels], y.ravel()[pixels], height.ravel()[pixels]], axis=-1)
     sample = (slice(None, None, 2), slice(None, None, 2))
-    on_table = inside[sample] & (np.abs(height[sample]) <= tuning.height) & ~coloured[sample]
+    on_table = inside[sample] & ~things[sample] & (np.abs(height[sample]) <= tuning.height)
     bare = np.stack([x[sample][on_table], y[sample][on_table]], axis=-1)
     keep = ~covers_robot(points, robot)
     colours = frame.rgb.reshape(-1, 3)[pixels[keep]]
