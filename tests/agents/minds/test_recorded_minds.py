@@ -1,8 +1,8 @@
 """What a strong mind answered, played again: eight tasks, each answer given by someone who saw requests alone.
 
 The answers in `recorded/` came through an OpenAI-compatible relay, by answerers who were shown prompts, pictures and
-schemas and nothing of the truth (November 2026; 16 runs, all achieved). They are served role by role, in their order, to the
-agents of today: pictures, segments, numbers on pictures, grasps, binding and motion are real.
+schemas and nothing of the truth (November 2026; 16 runs, all achieved). They are served role by role, in their order,
+to the agents of today: pictures, segments, numbers on pictures, grasps, binding and motion are real.
 """
 
 import json
