@@ -203,9 +203,12 @@ class ObjectInfo:
             gx, gy, gz = self.grasp.T_base_grasp[:3, 3]
             turned = np.degrees(np.arctan2(-self.grasp.T_base_grasp[0, 1], self.grasp.T_base_grasp[1, 1]))
             grasp = f", grasp at ({gx:.3f}, {gy:.3f}, {gz:.3f}) yaw {turned:.0f} deg"
+        free = ""
+        if self.free_spot is not None:
+            free = f", something lies on it, free about ({self.free_spot[0]:.3f}, {self.free_spot[1]:.3f})"
         return (
             f"[{self.index}] {self.name}: centre ({x:.3f}, {y:.3f}, {z:.3f}) m, "
-            f"extent {length:.3f} x {width:.3f} x {height:.3f} m, yaw {np.degrees(self.yaw):.0f} deg{grasp}"
+            f"extent {length:.3f} x {width:.3f} x {height:.3f} m, yaw {np.degrees(self.yaw):.0f} deg{grasp}{free}"
         )
 
 
@@ -271,7 +274,9 @@ class Part(enum.StrEnum):
     GRASP = "grasp"
     """Where its best grasp puts the TCP."""
     SURFACE = "surface"
-    """Middle of the object's upper side, or of what is still free of it, where a thing put onto it comes to rest."""
+    """Middle of the object's upper side, at the height where a thing put onto it comes to rest."""
+    FREE = "free"
+    """Middle of what is still free of its upper side; the same as SURFACE where nothing lies on it."""
     TOP = "top"
     """Middle of the object at the height of its highest point."""
     BASE = "base"
@@ -309,16 +314,22 @@ class HereAnchor(_Written):
 class Orientation(_Written):
     """How the gripper is turned at a step."""
 
-    kind: Literal["grasp", "top-down", "turn", "keep"] = "keep"
+    kind: Literal["grasp", "top-down", "turn", "align", "keep"] = "keep"
     """grasp: as the best grasp of object `index`. top-down: straight down, closing axis at `yaw`. turn: the
-    orientation of the step before, turned by `yaw` about the vertical. keep: as at the step before."""
+    orientation of the step before, turned by `yaw` about the vertical. align: turned about the vertical until the
+    long side of what is in the gripper points along `yaw`, counter-clockwise from the viewer's right; the shorter way
+    round unless `end` says which end shall point there. keep: as at the step before."""
     index: Annotated[int, Field(ge=0, le=63)] | None = None
     yaw: Radians = 0.0
+    end: Radians | None = None
+    """For align: the end that pointed nearest to this direction, likewise from the viewer's right, when it was taken."""
 
     @model_validator(mode="after")
     def _grasp_has_index(self) -> Orientation:
         if (self.kind == "grasp") != (self.index is not None):
             raise ValueError("orientation needs an object index with kind 'grasp', and only then")
+        if self.end is not None and self.kind != "align":
+            raise ValueError("orientation says an end with kind 'align' only")
         return self
 
 

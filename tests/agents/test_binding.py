@@ -174,10 +174,21 @@ def test_parts_are_at_their_heights_over_the_middle(part: Part, height: float) -
     np.testing.assert_allclose(point.T_base_tcp[:3, 3], [0.2, 0.1, height])
 
 
-def test_the_surface_is_where_it_is_free_when_something_lies_on_it() -> None:
-    plate = replace(made_object(0, "plate", (0.3, 0.0), size=(0.2, 0.2, 0.01)), free_spot=[0.33, -0.04])
-    (point,) = bound(step(ObjectAnchor(index=0, part=Part.SURFACE), orientation=DOWN), objects=(plate,))
-    np.testing.assert_allclose(point.T_base_tcp[:3, 3], [0.33, -0.04, 0.01])
+def test_what_is_free_of_a_surface_is_its_middle_until_something_lies_on_it() -> None:
+    empty = made_object(0, "plate", (0.3, 0.0), size=(0.2, 0.2, 0.01))
+    laden = replace(empty, free_spot=[0.33, -0.04])
+    for part, plate, wanted in (
+        (Part.FREE, empty, [0.3, 0.0, 0.01]),
+        (Part.FREE, laden, [0.33, -0.04, 0.01]),
+        (Part.SURFACE, laden, [0.3, 0.0, 0.01]),
+    ):
+        (point,) = bound(step(ObjectAnchor(index=0, part=part), orientation=DOWN), objects=(plate,))
+        np.testing.assert_allclose(point.T_base_tcp[:3, 3], wanted)
+
+
+def test_nothing_is_aligned_that_is_not_held() -> None:
+    with pytest.raises(FormatFailure, match="nothing is in the gripper"):
+        bound(step(PointAnchor(x=0.2, y=0.0), orientation=Orientation(kind="align")), objects=())
 
 
 def test_offsets_count_along_base_axes_or_the_viewers() -> None:

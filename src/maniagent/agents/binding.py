@@ -11,7 +11,7 @@ from collections.abc import Sequence
 import numpy as np
 
 from ..errors import FormatFailure, GraspFailure
-from ..geometry import FloatArray, make_transform, rotation_z, top_down_rotation
+from ..geometry import FloatArray, make_transform, rotation_z, top_down_rotation, wrap_angle
 from ..perception.viewpoint import Viewpoint
 from ..types import (
     ActionSequence,
@@ -22,6 +22,7 @@ from ..types import (
     KeyPoint,
     ObjectAnchor,
     ObjectInfo,
+    Orientation,
     OrientedBox,
     Part,
     PointAnchor,
@@ -92,10 +93,25 @@ class _Binder:
             return self._grasp_of(wanted.index).T_base_grasp[:3, :3]
         if wanted.kind == "top-down":
             return top_down_rotation(wanted.yaw)
+        if wanted.kind == "align":
+            return self._align(wanted)
         if self._previous is None:
             raise FormatFailure(f"{self._step}: the first step must say how the gripper is turned.")
         rotation = self._previous[:3, :3]
         return rotation_z(wanted.yaw) @ rotation if wanted.kind == "turn" else rotation
+
+    def _align(self, wanted: Orientation) -> FloatArray:
+        """The gripper turned so that what it holds points as wanted."""
+        if self._taken is None:
+            raise FormatFailure(f"{self._step}: nothing is in the gripper there that could be aligned.")
+        index, T_base_taken = self._taken
+        right = float(np.arctan2(self._viewpoint.right[1], self._viewpoint.right[0]))
+        axis = self._object(index).yaw
+        turn = wrap_angle(right + wanted.yaw - axis, np.pi)
+        if wanted.end is not None:
+            pointing = axis if np.cos(axis - right - wanted.end) >= 0.0 else axis + np.pi
+            turn = wrap_angle(right + wanted.yaw - pointing)
+        return rotation_z(turn) @ T_base_taken[:3, :3]
 
     def _target(self, step: ActionStep, rotation: FloatArray) -> FloatArray:
         offset = np.asarray(step.offset)
@@ -119,6 +135,8 @@ class _Binder:
             case Part.GRASP:
                 return self._grasp_of(anchor.index).T_base_grasp[:3, 3]
             case Part.SURFACE:
+                return np.array([x, y, thing.surface_z])
+            case Part.FREE:
                 spot = thing.centre[:2] if thing.free_spot is None else thing.free_spot
                 return np.array([*spot, thing.surface_z])
             case Part.TOP:

@@ -16,6 +16,7 @@ _PARTS = {
     "centre": "middle",
     "grasp": "grasp",
     "surface": "where things rest on it",
+    "free": "where it is free",
     "top": "top",
     "base": "underside",
     "left": "left of it",

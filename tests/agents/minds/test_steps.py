@@ -31,7 +31,7 @@ TAKE: list[dict[str, Any]] = [
 
 def keypoints(*steps: dict[str, Any], viewpoint: Viewpoint = VIEWPOINT) -> tuple[KeyPoint, ...]:
     written = Written.model_validate({"skill": "test", "steps": steps})
-    return bind(to_sequence(written, viewpoint), (KNIFE, PLATE), viewpoint)
+    return bind(to_sequence(written), (KNIFE, PLATE), viewpoint)
 
 
 def examples() -> list[tuple[str, Written]]:
@@ -53,8 +53,8 @@ def test_the_prompts_examples_move_as_the_rules_do(subtask: str, written: Writte
     wanted = RulesControllerAgent().write(
         Subtask(previous=Verdict.INITIAL, reason="", text=text, objects=tuple(names)), objects
     )
-    ours, theirs = bind(to_sequence(written, VIEWPOINT), objects, VIEWPOINT), bind(wanted, objects, VIEWPOINT)
-    assert to_sequence(written, VIEWPOINT).skill == wanted.skill
+    ours, theirs = bind(to_sequence(written), objects, VIEWPOINT), bind(wanted, objects, VIEWPOINT)
+    assert to_sequence(written).skill == wanted.skill
     assert [p.gripper for p in ours] == [p.gripper for p in theirs]
     for a, b in zip(ours, theirs, strict=True):
         np.testing.assert_allclose(a.T_base_tcp, b.T_base_tcp, atol=0.007)  # travelling 6 mm higher or not
@@ -75,17 +75,24 @@ def test_what_is_held_is_known_without_being_said() -> None:
     assert down.T_base_tcp[2, 3] == pytest.approx(PLATE.surface_z + grasp_height)
 
 
-@given(st.floats(-math.pi, math.pi), st.sampled_from(["away", "across"]))
-def test_a_long_thing_lies_as_told_for_every_viewpoint(view_yaw: float, lie: str) -> None:
+HEADINGS = {"right": (1, 0), "away": (0, 1), "left": (-1, 0), "towards": (0, -1)}
+
+
+@given(st.floats(-math.pi, math.pi), st.sampled_from(sorted(HEADINGS)), st.sampled_from([None, *sorted(HEADINGS)]))
+def test_a_long_thing_points_as_told_for_every_viewpoint(view_yaw: float, lie: str, end: str | None) -> None:
     turn = rotation_z(view_yaw)[:2, :2]
     viewpoint = Viewpoint(turn @ VIEWPOINT.right, turn @ VIEWPOINT.away)
-    *_, taken, put = keypoints(
-        *TAKE[:2], {"do": "put", "to": "left", "object": 1, "lie": lie, "gripper": "open"}, viewpoint=viewpoint
-    )
+    seen = {name: x * viewpoint.right + y * viewpoint.away for name, (x, y) in HEADINGS.items()}
+    put_down = {"do": "put", "to": "left", "object": 1, "lie": lie, "end": end, "gripper": "open"}
+    *_, taken, put = keypoints(*TAKE[:2], put_down, viewpoint=viewpoint)
     turned = yaw_of_top_down(put.T_base_tcp[:3, :3]) - yaw_of_top_down(taken.T_base_tcp[:3, :3])
-    axis = rotation_z(KNIFE.yaw + turned)[:2, 0]
-    wanted = viewpoint.away if lie == "away" else viewpoint.right
-    assert abs(axis @ wanted) == pytest.approx(1.0)
+    axis_before, axis = rotation_z(KNIFE.yaw)[:2, 0], rotation_z(KNIFE.yaw + turned)[:2, 0]
+    assert abs(axis @ seen[lie]) == pytest.approx(1.0)
+    if end is None:
+        assert axis_before @ axis > -1e-9, "turned the longer way round"
+    elif abs(axis_before @ seen[end]) > 1e-6:
+        leading = axis if axis_before @ seen[end] > 0 else -axis
+        assert leading @ seen[lie] == pytest.approx(1.0)
 
 
 @pytest.mark.parametrize(

@@ -32,7 +32,9 @@ Offset = Annotated[float, Field(ge=-1.0, le=1.0, allow_inf_nan=False)]
 """m"""
 Coordinate = Annotated[float, Field(ge=-2.0, le=2.0, allow_inf_nan=False)]
 """m"""
-Place = Literal["grasp", "surface", "top", "base", "centre", "left", "right", "near", "far", "point", "here"]
+Heading = Literal["left", "right", "away", "towards"]
+"""As the viewer sees it."""
+Place = Literal["grasp", "surface", "free", "top", "base", "centre", "left", "right", "near", "far", "point", "here"]
 
 
 def _untitled(schema: dict[str, Any]) -> None:
@@ -93,7 +95,10 @@ class WrittenStep(Answer):
     up: Offset = 0.0
     turn: Annotated[float, Field(ge=-360.0, le=360.0, allow_inf_nan=False)] = 0.0
     """Degrees, counter-clockwise seen from above."""
-    lie: Literal["keep", "away", "across"] = "keep"
+    lie: Literal["keep"] | Heading = "keep"
+    """Where a long thing points on arrival."""
+    end: Heading | None = None
+    """Which end shall point there: the one that points this way now."""
     gripper: Literal["open", "close", "keep"] = "keep"
 
 

@@ -40,7 +40,7 @@ class MindControllerAgent:
 
         written = self._llm.ask(Question("controller", instructions, (question,), Written, check))
         self._latest = (subtask, written)
-        return to_sequence(written, viewpoint)
+        return to_sequence(written)
 
     def learn(self, record: SubtaskRecord) -> None:
         """Nothing: what a model wrote once, it doesn't remember; the action cache does."""
@@ -56,7 +56,7 @@ class MindControllerAgent:
 
 def _check(written: Written, objects: Sequence[ObjectInfo], viewpoint: Viewpoint) -> None:
     """Raise Unfit unless the sequence binds, and puts down what it brings to another object."""
-    sequence = to_sequence(written, viewpoint)
+    sequence = to_sequence(written)
     try:
         keypoints = bind(sequence, objects, viewpoint)
     except GraspFailure as failure:

@@ -65,7 +65,10 @@ class MindSceneAgent:
 def _tell_names(names: Sequence[str]) -> str:
     if not names:
         return ""
-    return f"At the last look things were called: {', '.join(names)}. Call what you still see by the same name."
+    return (
+        f"At the last look things were called: {', '.join(names)}. Call what you still see by the same name, unless "
+        "it says a place where the thing is no longer."
+    )
 
 
 def _names_differ(seen: Seen) -> None:

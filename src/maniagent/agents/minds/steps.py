@@ -6,10 +6,9 @@ What a model gets wrong easily is worked out here: which object is in the grippe
 from __future__ import annotations
 
 import math
+from collections.abc import Mapping
 
-from ...geometry import FloatArray, wrap_angle
 from ...models.question import Unfit
-from ...perception.viewpoint import Viewpoint
 from ...types import (
     ActionSequence,
     ActionStep,
@@ -20,13 +19,15 @@ from ...types import (
     Part,
     PointAnchor,
 )
-from .answers import Written, WrittenStep
+from .answers import Heading, Written, WrittenStep
 
 HIGHEST_DROP = 0.03
 """m above a place from which something held may be let go."""
+_HEADINGS: Mapping[Heading, float] = {"right": 0.0, "away": math.pi / 2, "left": math.pi, "towards": -math.pi / 2}
+"""rad, counter-clockwise from the viewer's right."""
 
 
-def to_sequence(written: Written, viewpoint: Viewpoint) -> ActionSequence:
+def to_sequence(written: Written) -> ActionSequence:
     """The sequence that was meant. Raises Unfit, naming the step, where it can't be carried out as it stands."""
     held: int | None = None
     opened = False
@@ -37,7 +38,7 @@ def to_sequence(written: Written, viewpoint: Viewpoint) -> ActionSequence:
             raise Unfit(f"{where} closes the fingers on the grasp, but no step before opens them above it.")
         if held is not None and step.gripper == "open" and step.up > HIGHEST_DROP and step.to != "here":
             raise Unfit(f"{where} drops the object from {step.up:.2f} m. Lower it first.")
-        steps.append(_to_step(step, held, viewpoint, where, first=number == 1))
+        steps.append(_to_step(step, held, where, first=number == 1))
         if step.gripper == "open":
             held, opened = None, True
         elif step.gripper == "close" and step.to == "grasp" and held is None:
@@ -45,7 +46,7 @@ def to_sequence(written: Written, viewpoint: Viewpoint) -> ActionSequence:
     return ActionSequence(skill=written.skill, steps=tuple(steps))
 
 
-def _to_step(step: WrittenStep, held: int | None, viewpoint: Viewpoint, where: str, *, first: bool) -> ActionStep:
+def _to_step(step: WrittenStep, held: int | None, where: str, *, first: bool) -> ActionStep:
     anchor = _anchor(step, where)
     return ActionStep(
         description=step.do,
@@ -53,7 +54,7 @@ def _to_step(step: WrittenStep, held: int | None, viewpoint: Viewpoint, where: s
         offset=(step.right, step.away, step.up),
         offset_frame="viewer",
         carrying=None if isinstance(anchor, HereAnchor) else held,
-        orientation=_orientation(step, held, viewpoint, where, first=first),
+        orientation=_orientation(step, held, where, first=first),
         gripper=Gripper(step.gripper),
     )
 
@@ -70,18 +71,14 @@ def _anchor(step: WrittenStep, where: str) -> ObjectAnchor | PointAnchor | HereA
     return ObjectAnchor(index=step.object, part=Part(step.to))
 
 
-def _orientation(step: WrittenStep, held: int | None, viewpoint: Viewpoint, where: str, *, first: bool) -> Orientation:
+def _orientation(step: WrittenStep, held: int | None, where: str, *, first: bool) -> Orientation:
     if step.lie != "keep":
         if held is None:
             raise Unfit(f"{where} says how the object shall lie, but none is held there.")
-        return Orientation(kind="top-down", yaw=_closing_yaw(viewpoint.right if step.lie == "away" else viewpoint.away))
+        end = None if step.end is None else _HEADINGS[step.end]
+        return Orientation(kind="align", yaw=_HEADINGS[step.lie], end=end)
     if step.turn:
         return Orientation(kind="turn", yaw=math.radians(step.turn))
     if step.to == "grasp" and held is None:
         return Orientation(kind="grasp", index=step.object)
     return Orientation(kind="top-down") if first else Orientation()
-
-
-def _closing_yaw(direction: FloatArray) -> float:
-    """Yaw (rad) of a top-down gripper that closes along `direction` (2,): a long thing is held across its width."""
-    return wrap_angle(math.atan2(-float(direction[0]), float(direction[1])), math.pi)

@@ -13,6 +13,7 @@ from ...types import ObjectInfo, SubtaskRecord, Verdict
 
 MOST_REMEMBERED = 12
 """Past sub-tasks that are told; of earlier ones only how many there were."""
+_BROKEN_WORD = re.compile(r"(?<=\s)\S{1,30}$")
 _ARTICLE = re.compile(r"^(?:the|a|an)\s+")
 
 
@@ -20,7 +21,10 @@ def fenced(text: str, limit: int = 4000) -> str:
     """`text` without what could close a fence such as <scene>, without control characters, at most `limit` long."""
     visible = "".join(c for c in text if c == "\n" or unicodedata.category(c)[0] != "C")
     visible = visible.translate({ord("<"): "‹", ord(">"): "›"}).strip()
-    return visible if len(visible) <= limit else visible[: limit - 4] + " ..."
+    if len(visible) <= limit:
+        return visible
+    kept = visible[: limit - 4]
+    return (kept if visible[limit - 4].isspace() else _BROKEN_WORD.sub("", kept)) + " ..."
 
 
 def one_line(text: str, limit: int = 200) -> str:
@@ -65,5 +69,5 @@ def _tell_record(number: int, record: SubtaskRecord) -> str:
     else:
         outcome = f"broke off after {report.reached} movements: {one_line(report.reason)} ({report.stage})"
     judged = {Verdict.SUCCESS: "achieved", Verdict.FAILURE: "not achieved"}.get(record.verdict)
-    verdict = f" Judged: {judged}. {one_line(record.evidence)}" if judged else ""
+    verdict = f" Judged: {judged}. {one_line(record.evidence, 300)}" if judged else ""
     return f'{number}. "{one_line(record.text)}" ({", ".join(map(one_line, record.queries))}): {outcome}.{verdict}'

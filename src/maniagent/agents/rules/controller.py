@@ -192,7 +192,7 @@ def _goal_of(command: Command, *, prefer_left: bool = False) -> _Goal:
     if command.relation is Relation.IN:
         return _Goal(ObjectAnchor(index=1, part=Part.TOP), f"over the {command.target}", (0.0, 0.0, INTO))
     if command.relation is Relation.ON:
-        return _Goal(ObjectAnchor(index=1, part=Part.SURFACE), f"above the {command.target}")
+        return _Goal(ObjectAnchor(index=1, part=Part.FREE), f"above the {command.target}")
     side = Part.LEFT if prefer_left and command.relation is Relation.NEXT_TO else _SIDES[_relation(command)]
     return _Goal(ObjectAnchor(index=1, part=side), f"{_SIDE_NAMES[side]} the {command.target}")
 
