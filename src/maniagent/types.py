@@ -322,7 +322,7 @@ class Orientation(_Written):
     index: Annotated[int, Field(ge=0, le=63)] | None = None
     yaw: Radians = 0.0
     end: Radians | None = None
-    """For align: the end that pointed nearest to this direction, likewise from the viewer's right, when it was taken."""
+    """For align: the end that pointed nearest to this direction (from the right, as `yaw`) when it was taken."""
 
     @model_validator(mode="after")
     def _grasp_has_index(self) -> Orientation:
