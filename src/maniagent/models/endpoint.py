@@ -12,7 +12,7 @@ from .dialogue import Prompt, Reply, to_messages, to_parameters, to_reply
 from .exchange import Mode
 from .faults import Fault, one_line, to_fault
 from .names import Address
-from .transport import TooLong, missing_extra, open_client
+from .transport import AnswerRefused, missing_extra, open_client
 
 if TYPE_CHECKING:
     from pydantic_ai.models import Model
@@ -69,7 +69,7 @@ class Endpoint:
             response = await model_request(
                 self._model, messages, model_settings=settings, model_request_parameters=parameters
             )
-        except (AgentRunError, TooLong) as error:
+        except (AgentRunError, AnswerRefused) as error:
             fault = to_fault(error, timeout)
         except UserError as error:  # what the library knows the model can't do
             fault = Fault("final", str(error))

@@ -4,7 +4,7 @@ from __future__ import annotations
 
 from typing import TYPE_CHECKING, Any, Literal
 
-from .transport import TooLong
+from .transport import AnswerRefused
 
 if TYPE_CHECKING:
     from pydantic_ai.exceptions import AgentRunError
@@ -28,14 +28,14 @@ class Fault(Exception):
         """The model may have worked, and be paid for, although no answer came."""
 
 
-def to_fault(error: AgentRunError | TooLong, timeout: float) -> Fault:
+def to_fault(error: AgentRunError | AnswerRefused, timeout: float) -> Fault:
     """The fault behind an error of the client library."""
     from pydantic_ai import exceptions as known
 
     reason = _reason(error)
     match error:
-        case _ if too_long := _caused_by(error, TooLong):
-            return Fault("final", str(too_long), sent=True)
+        case _ if refused := _caused_by(error, AnswerRefused):
+            return Fault("final", str(refused), sent=True)
         case known.ModelRequestTimeout() | known.ModelTimeoutError(phase="read" | "write"):
             return Fault("timeout", f"no whole answer within {timeout:.3g} s", sent=True)
         case known.ModelAuthenticationError():
@@ -54,7 +54,7 @@ def to_fault(error: AgentRunError | TooLong, timeout: float) -> Fault:
             return Fault("final", reason)
 
 
-def _reason(error: AgentRunError | TooLong) -> str:
+def _reason(error: AgentRunError | AnswerRefused) -> str:
     """The HTTP status where there is one, and the server's own words."""
     status = getattr(error, "status_code", None)
     words = _words(getattr(error, "body", None)) or ("" if status else _with_cause(error))

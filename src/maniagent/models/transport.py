@@ -12,12 +12,14 @@ if TYPE_CHECKING:
 
 MOST_BYTES = 8 * 2**20
 """Of one answer; text that goes on without an end must not fill the memory until the time is up."""
+_PLAIN = "identity"
+"""The one content encoding that is asked for and read: what is packed may unpack to a thousand times its length."""
 _CONNECT = 10.0
 """Seconds in which a server must take the connection."""
 
 
-class TooLong(Exception):
-    """A server's answer has more than MOST_BYTES."""
+class AnswerRefused(Exception):
+    """A server's answer that isn't read to its end: it has more than MOST_BYTES, or it is compressed."""
 
 
 def missing_extra() -> SetupError:
@@ -26,7 +28,7 @@ def missing_extra() -> SetupError:
 
 
 def open_client() -> httpx2.AsyncClient:
-    """A client that raises TooLong where an answer doesn't end.
+    """A client that raises AnswerRefused where an answer doesn't end, or is compressed.
 
     A request's own time-outs are set by who sends it. Raises SetupError where the extra is missing.
     """
@@ -36,7 +38,7 @@ def open_client() -> httpx2.AsyncClient:
         raise missing_extra() from error
 
     class Bounded(httpx2.AsyncByteStream):
-        """A stream of bytes that ends with TooLong."""
+        """A stream of bytes that ends with AnswerRefused."""
 
         def __init__(self, stream: httpx2.AsyncByteStream) -> None:
             self._stream = stream
@@ -46,15 +48,19 @@ def open_client() -> httpx2.AsyncClient:
             async for chunk in self._stream:
                 length += len(chunk)
                 if length > MOST_BYTES:
-                    raise TooLong(f"the answer has more than {MOST_BYTES // 2**20} MiB")
+                    raise AnswerRefused(f"the answer has more than {MOST_BYTES // 2**20} MiB")
                 yield chunk
 
         async def aclose(self) -> None:
             await self._stream.aclose()
 
     async def bound(response: httpx2.Response) -> None:
+        encoding = response.headers.get("content-encoding", _PLAIN)
+        if encoding.lower() != _PLAIN:
+            raise AnswerRefused(f"the answer is compressed ({encoding[:20]}), which was not asked for")
         if isinstance(response.stream, httpx2.AsyncByteStream):
             response.stream = Bounded(response.stream)
 
     timeout = httpx2.Timeout(None, connect=_CONNECT)
-    return httpx2.AsyncClient(timeout=timeout, event_hooks={"response": [bound]})
+    headers = {"Accept-Encoding": _PLAIN}
+    return httpx2.AsyncClient(headers=headers, timeout=timeout, event_hooks={"response": [bound]})
