@@ -148,7 +148,7 @@ def test_another_verdict_is_a_difference(folder: Path) -> None:
 
 
 def test_only_the_rules_can_be_made_from_their_name(folder: Path) -> None:
-    with pytest.raises(UsageError, match="'scripted'; only those of 'rules'"):
+    with pytest.raises(UsageError, match="'scripted'; only those that maniagent brings"):
         replay(folder)
 
 

@@ -5,13 +5,8 @@ from pathlib import Path
 
 import pytest
 
-from maniagent.agents.minds import minds_agents
-from maniagent.agents.protocols import Agents
 from maniagent.app import run
 from maniagent.crew import ModelCrew
-from maniagent.models.replay import ReplayModel
-from maniagent.perception.detectors.registry import make_detector
-from maniagent.perception.rig import Rig
 from maniagent.replay.play import replay
 from models.fake_server import says, serving
 
@@ -24,14 +19,10 @@ def test_recorded_answers_stand_in_for_the_models(tmp_path: Path) -> None:
     with serving(says(json.dumps(scene)), says(json.dumps(give_up))) as server:
         run(task="hungry", crew=ModelCrew(vlm="vllm:a", llm="vllm:b", base_url=f"{server.url}/v1"), out=folder)
 
-    def make_agents(rig: Rig) -> Agents:
-        model = ReplayModel(folder)
-        return minds_agents(rig, model, model, make_detector("marks", model))
-
-    found = replay(folder, make_agents)
+    found = replay(folder)
     assert (found.same, found.complete, found.turns, found.decisions) == (True, True, 1, 2)
     recorded = (folder / "exchanges.jsonl").read_text()
     (folder / "exchanges.jsonl").write_text(recorded.replace("There is nothing to eat.", "I give up."))
-    different = replay(folder, make_agents).difference
+    different = replay(folder).difference
     assert different is not None
     assert (different.kind, different.where) == ("reasoned", "subtask.reason")

@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import re
 from collections import deque
 from collections.abc import Callable, Sequence
 from dataclasses import dataclass, replace
@@ -10,9 +11,12 @@ from pathlib import Path
 from ..agents.cache import Hit, Kind, with_cache
 from ..agents.events import EventLog, Observer
 from ..agents.loop import AgentLoop
+from ..agents.minds import minds_agents
 from ..agents.protocols import Agents
 from ..agents.rules import rules_agents
 from ..errors import UsageError
+from ..models.replay import ReplayModel
+from ..perception.detectors.registry import make_detector
 from ..perception.rig import Rig
 from ..types import ActionSequence, RunVerdict, Subtask, SubtaskRecord
 from .compare import Comparison, Difference, Different
@@ -20,6 +24,8 @@ from .record import RecordedRun, read_run
 from .robot import EndOfRecord, ReplayRobot
 
 MakeAgents = Callable[[Rig], Agents]
+_ON_MODELS = re.compile(r"agents \(vlm .*, llm .*, detector (?P<detector>.+)\)")
+"""How agents on models are named."""
 
 
 @dataclass(frozen=True)
@@ -45,8 +51,9 @@ class ReplayResult:
 def replay(folder: Path, make_agents: MakeAgents | None = None, observers: Sequence[Observer] = ()) -> ReplayResult:
     """Carry out a recorded run again, without robot, simulator or network, until its end or the first difference.
 
-    `make_agents` makes the agents that decide; without it they are those of the run, which must have been the rules.
-    They are made without a cache: where the run had one, it answers as it did then.
+    `make_agents` makes the agents that decide; without it they are those of the run: the rules, or the four agents with
+    maniagent's own prompts and the recorded answers in the models' place. They are made without a cache: where the run
+    had one, it answers as it did then.
 
     Raises UsageError where the folder can't be replayed.
     """
@@ -74,9 +81,13 @@ def replay(folder: Path, make_agents: MakeAgents | None = None, observers: Seque
 
 
 def _agents_of(run: RecordedRun) -> MakeAgents:
-    if run.agents != "rules":
-        raise UsageError(f"The run's agents were {run.agents!r}; only those of 'rules' can be made from their name.")
-    return rules_agents
+    if run.agents == "rules":
+        return rules_agents
+    named = _ON_MODELS.fullmatch(run.agents)
+    if named is None:
+        raise UsageError(f"The run's agents were {run.agents!r}; only those that maniagent brings can be made by name.")
+    model = ReplayModel(run.folder)
+    return lambda rig: minds_agents(rig, model, model, make_detector(named["detector"], model))
 
 
 def _ended_early(run: RecordedRun, comparison: Comparison) -> Difference | None:
