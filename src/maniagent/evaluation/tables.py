@@ -106,20 +106,20 @@ def markdown(summary: Summary) -> str:
         f"{summary.finished} of {summary.total} episodes: {settings.episodes} for each task and seed, seeds 0 to "
         f"{settings.seeds - 1}{f'; poses: {settings.poses}' if settings.poses else ''}. maniagent {settings.version}. "
         f"Medians of turns, steps and seconds; {interval_note(summary)}; the average weighs every task the same.",
-        _markdown_table(result_table(summary)),
+        markdown_table(result_table(summary)),
     ]
     if (times := time_table(summary)).rows:
-        parts += ["## Wall time", _markdown_table(times)]
+        parts += ["## Wall time", markdown_table(times)]
     if summary.stages:
-        parts += ["## Failures by stage", _markdown_table(stage_table(summary))]
+        parts += ["## Failures by stage", markdown_table(stage_table(summary))]
     if summary.failed:
         rows = tuple(
             (failed.result.job.name, failed.result.stage, failed.result.reason, f"`{failed.repeat}`")
             for failed in summary.failed
         )
-        parts += ["## Failed episodes", _markdown_table(Table(("episode", "stage", "reason", "again"), rows))]
+        parts += ["## Failed episodes", markdown_table(Table(("episode", "stage", "reason", "again"), rows))]
     if summary.published:
-        parts += ["## Published figures", _markdown_table(published_table(summary))]
+        parts += ["## Published figures", markdown_table(published_table(summary))]
     return "\n\n".join(parts) + "\n"
 
 
@@ -173,7 +173,8 @@ def _number(value: float | None) -> str:
     return "" if value is None else f"{value:.1f}".removesuffix(".0")
 
 
-def _markdown_table(table: Table) -> str:
+def markdown_table(table: Table) -> str:
+    """The table in Markdown; what would break it in a cell is escaped."""
     lines = [table.head, ("---",) * len(table.head), *table.rows]
     return "\n".join(f"| {' | '.join(map(_markdown_cell, line))} |" for line in lines)
 
