@@ -73,10 +73,10 @@ def _fits(said: Said, index: int, things: Sequence[Thing], kinds: Sequence[Said]
     kind = kinds[index]
     if said.noun is None or said.noun != kind.noun or not _colours_agree(said, kind):
         return False
-    alikes = [thing for thing, other in zip(things, kinds, strict=True) if other.noun == kind.noun]
-    coloured = [thing for thing, other in zip(things, kinds, strict=True) if other == kind]
+    alikes = [(one, other) for one, other in zip(things, kinds, strict=True) if other.noun == kind.noun]
     # "The left red pepper" may be the leftmost of all peppers, or of the red ones.
-    return any(all(_is_at(side, things[index], group) for side in said.sides) for group in (alikes, coloured))
+    groups = [one for one, _ in alikes], [one for one, other in alikes if _colours_agree(said, other)]
+    return any(all(_is_at(side, things[index], group) for side in said.sides) for group in groups)
 
 
 def _colours_agree(said: Said, kind: Said) -> bool:
