@@ -11,11 +11,14 @@ from PIL import Image
 from typer.testing import CliRunner, Result
 
 from maniagent.agents.minds.prompts import Prompts
+from maniagent.app import run
 from maniagent.cli import app
 from maniagent.errors import FormatFailure, ModelFailure, UnknownNameError, UsageError
 from maniagent.evaluation.prompts import Scoring, load_variants, scenes_of, score_prompts
+from maniagent.evaluation.prompts.scenes import draw
 from maniagent.evaluation.prompts.variants import PACKAGED
-from maniagent.testing import ScriptedModel
+from maniagent.testing import ScriptedAgents, ScriptedModel
+from maniagent.types import Subtask, Verdict
 from models.fake_server import Asked, Raw, fails, says, serving
 
 BOTH, PLATE, CLUTTER = ("carrot", "plate"), ("plate",), ("orange carrot", "plate", "robot arm", "table top")
@@ -61,6 +64,12 @@ def test_of_equals_the_packaged_prompt_stays(terse: Path, tmp_path: Path) -> Non
     assert score(terse, tmp_path / "out", [seen(*BOTH)]).winner == PACKAGED
 
 
+def test_a_prompt_alone_wins_over_nobody(tmp_path: Path) -> None:
+    model = ScriptedModel({"scene": [seen(*BOTH)]})
+    scoring = score_prompts(model, load_variants(), scenes_of(["carrot-on-plate"], seeds=1), tmp_path / "out")
+    assert (scoring.winner, scoring.scores[0].recall) == (None, 1.0)
+
+
 def test_no_answer_that_fits_counts_as_nothing_named(terse: Path, tmp_path: Path) -> None:
     scoring = score(terse, tmp_path / "out", [seen(*BOTH), FormatFailure("No answer fits.")])
     own = scoring.scores[1]
@@ -74,6 +83,14 @@ def test_every_question_is_asked_afresh_with_the_words_of_its_variant(terse: Pat
     instructions = [question.instructions for question in model.asked]
     assert instructions == [Prompts.load().scene.instructions.strip(), "Name things TERSELY."] * 2
     assert all("carrot" not in str(question.parts[1]).replace("put the carrot on", "") for question in model.asked)
+
+
+def test_the_picture_is_the_one_that_a_run_begins_with() -> None:
+    (scene,) = scenes_of(["carrot-on-plate"], seeds=2)[1:]
+    agents = ScriptedAgents([Subtask(previous=Verdict.INITIAL, reason="Nothing is wanted.", done=True)])
+    run(task="carrot-on-plate", seed=1, agents=lambda rig: agents.as_agents())
+    shown, begun = draw(scene).observation.main_frame, agents.described[0].main_frame
+    assert np.array_equal(shown.rgb, begun.rgb)
 
 
 # What is kept -----------------------------------------------------------------------------------------------------

@@ -9,6 +9,7 @@ from typing import Protocol
 
 from ...agents.minds.eyes import Eyes
 from ...agents.minds.scene import MindSceneAgent
+from ...agents.minds.telling import one_line
 from ...errors import FormatFailure
 from ...models.question import ChatModel
 from ...perception.detectors.registry import make_detector
@@ -92,7 +93,7 @@ def _ask(model: ChatModel, variant: Variant, scene: LabelledScene, key: str) -> 
     try:
         names = agent.describe(scene.instruction, scene.observation).names
     except FormatFailure as error:
-        failure = str(error)
+        failure = one_line(str(error), 500)
     seconds = round(time.monotonic() - start, 2)
     return Answer(
         key=key, scene=scene.name, variant=variant.name, model=model.name, names=names, failure=failure, seconds=seconds

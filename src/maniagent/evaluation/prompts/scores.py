@@ -100,8 +100,8 @@ class Scoring:
 
     @property
     def winner(self) -> str | None:
-        """The variant with the highest recall, then relevance; of equals the first; None before any scene is done."""
-        if not self.scores[0].scenes:
+        """The variant with the highest recall, then relevance; of equals the first; None where nothing is compared."""
+        if len(self.scores) < 2 or not self.scores[0].scenes:
             return None
         return max(self.scores, key=lambda score: (round(score.recall, 9), round(score.relevance, 9))).name
 
