@@ -211,7 +211,7 @@ def test_the_command_asks_a_server_and_says_who_wins(terse: Path, tmp_path: Path
     plain = json.loads(done.stdout)
     assert [(one["name"], one["recall"]) for one in plain["variants"]] == [(PACKAGED, 1.0), ("terse", 0.5)]
     assert plain["winner"] == PACKAGED
-    assert "wins" in told.stdout
+    assert "'packaged' wins by recall" in told.stdout
     assert (out / "exchanges.jsonl").read_text().count("\n") == 2
 
 

@@ -74,12 +74,12 @@ def score(
 
 def _tell(scoring: Scoring, as_json: bool) -> None:
     from ..console.output import print_json, print_table
-    from ..evaluation.prompts.report import MARKDOWN, score_table, to_plain
+    from ..evaluation.prompts.report import MARKDOWN, score_table, to_plain, verdict
 
     if as_json:
         print_json(to_plain(scoring))
         return
     table = score_table(scoring)
     print_table(table.head, table.rows)
-    typer.echo()
+    typer.echo(f"\n{verdict(scoring)}")
     typer.echo(scoring.out / MARKDOWN)

@@ -23,23 +23,26 @@ def write(scoring: Scoring) -> None:
 
 
 def score_table(scoring: Scoring) -> Table:
-    """A row for each prompt, the winner marked."""
-    head = ("prompt", "recall %", "relevance %", "really there %", "all named %", "nothing missed", "no answer",
-            "better", "worse", "")  # fmt: skip
-    return Table(head, tuple(_row(score, scoring.winner == score.name) for score in scoring.scores))
+    """A row for each prompt; narrow enough for a terminal of 80 columns."""
+    head = ("prompt", "recall %", "relevance %", "real %", "all %", "complete", "failed", "better", "worse")
+    return Table(head, tuple(map(_row, scoring.scores)))
 
 
-def _row(score: VariantScore, wins: bool) -> tuple[str, ...]:
+def _row(score: VariantScore) -> tuple[str, ...]:
     shares = (score.recall, score.relevance, score.real, score.coverage)
     compared = ("", "") if score.name == PACKAGED else (str(score.better), str(score.worse))
-    return (
-        score.name,
-        *(f"{100 * share:.1f}" for share in shares),
-        f"{score.complete} of {score.scenes}",
-        str(score.failed),
-        *compared,
-        "wins" if wins else "",
-    )
+    complete = f"{score.complete} of {score.scenes}"
+    return (score.name, *(f"{100 * share:.1f}" for share in shares), complete, str(score.failed), *compared)
+
+
+def verdict(scoring: Scoring) -> str:
+    """Which prompt wins, in a sentence."""
+    if len(scoring.scores) < 2:
+        return "One prompt alone wins over nobody: name others to compare it with."
+    if scoring.winner is None:
+        return "No scene was finished with every prompt."
+    kept = "; nothing is gained by changing it" if scoring.winner == PACKAGED else ""
+    return f"{scoring.winner!r} wins by recall, then relevance{kept}."
 
 
 def markdown(scoring: Scoring) -> str:
@@ -48,9 +51,11 @@ def markdown(scoring: Scoring) -> str:
     parts = [
         "# Prompts for the scene",
         f"{scoring.model}, {tried} of {scoring.scenes} scenes. Recall: what matters and was named, of what matters. "
-        "Relevance: names of what matters, of all names. Means over the scenes; recall decides, then relevance. Better "
-        "and worse: on how many scenes than the packaged prompt.",
+        "Relevance: names of what matters, of all names. Real: names of what is there, of all names. All: what was "
+        "named, of all that is there. These are means over the scenes. Complete: scenes of which nothing that matters "
+        "was missed. Failed: no answer that fits. Better and worse: on how many scenes than the packaged prompt.",
         markdown_table(score_table(scoring)),
+        verdict(scoring),
     ]
     if failed := [result for result in scoring.results if result.answer.failure]:
         rows = tuple((r.answer.scene, r.answer.variant, r.answer.failure) for r in failed)
