@@ -153,7 +153,6 @@ WIRE: dict[str, tuple[Script | None, str, float]] = {
     "500s": (fails(500, "out of order"), "HTTP 500: out of order", 20.0),
     "429 that asks for an hour": (fails(429, "slow down", retry_after="3600"), "asks to wait 3600 s", 20.0),
     "429 that asks for ever": (fails(429, "slow down", retry_after="inf"), "HTTP 429: slow down", 20.0),
-    "nothing": (lambda _: Raw(status=204), "gives no answer", 20.0),
 }
 
 
@@ -219,7 +218,6 @@ UNFIT: dict[str, dict[str, tuple[Any, str]]] = {
         "not JSON": ("<html>", "holds no JSON object"),
         "an empty list": ({**ACT, "objects": []}, "objects is empty"),
         "an object that isn't there": ({**ACT, "objects": ["gun"]}, "The scene lists no 'gun'"),
-        "endless text": ({**ACT, "subtask": LONG}, "at most 200"),
     },
     "NamedMarks": {
         "an empty list": ({"found": []}, "exactly one entry"),
@@ -282,7 +280,6 @@ AWAY: dict[str, Sequence[Json]] = {
     "off the table": ({}, {}, {}, {"to": "point", "object": None, "x": 0.3, "y": -1.5}),
     "behind the robot": ({"to": "point", "object": None, "x": -0.5, "y": 0.0, "up": 0.2},),
     "into the table": ({"up": -0.2},),
-    "through the plate": ({"to": "base", "object": 1, "up": -0.05},),
     "to the sky": ({"up": 1.0},),
 }
 
