@@ -156,7 +156,7 @@ def test_a_pepper_is_put_on_the_plate_by_what_a_model_writes() -> None:
     judged = model.asked[-1].parts[0]
     assert "the arm made every movement" in judged
     measured = judged.partition("Measured: what looks like the red pepper is now at")[2]
-    for told in ("pointing away or towards the viewer", "from where it was before", "turned by", "beside the middle"):
+    for told in ("pointing away or towards the viewer", "from where it was before", "turned by", "its middle is over where the plate was"):
         assert told in measured
 
 

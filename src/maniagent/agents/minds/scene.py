@@ -66,8 +66,8 @@ def _tell_names(names: Sequence[str]) -> str:
     if not names:
         return ""
     return (
-        f"At the last look things were called: {', '.join(names)}. Call what you still see by the same name, unless "
-        "it says a place where the thing is no longer."
+        f"At the last look things were called:\n<names>{fenced(', '.join(names))}</names>\nCall what you still see by "
+        "the same name, unless it says a place where the thing is no longer."
     )
 
 
