@@ -1,0 +1,1 @@
+"""Collected demonstrations: how episodes are recorded, staged, judged, and made into datasets."""
