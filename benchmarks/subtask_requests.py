@@ -7,7 +7,7 @@ what segmentation and the lexicon see; then the ControllerAgent is asked for the
 rule-made one where the model named none whose objects are found. Agents, prompts, repairs, loop, binding and motion
 gate are those of a run, and what passes the gate is carried out in the twin.
 
-That nothing malformed reaches the robot is checked without the gate's code (`asking/watch.py`): the accepted
+That nothing malformed reaches the robot is checked without the gate's code (`requesting/watch.py`): the accepted
 sequence's JSON is read by hand; key points are looked at on their way in, and compared with those that were accepted;
 and every command to the servos is watched, as is where MuJoCo then has the arm.
 
@@ -51,8 +51,8 @@ def main() -> int:
     if said.llm is None:
         print(NEEDS_A_MODEL)
         return 0
-    from asking.runner import Settings, run
     from maniagent.errors import ManiAgentError
+    from requesting.runner import Settings, run
 
     try:
         page = run(Settings(**vars(said)))

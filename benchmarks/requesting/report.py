@@ -58,6 +58,7 @@ CONTROLLER: dict[str, Column] = {
     "the rules' own passes": share(lambda line: line.rules_pass),
     "carried out to the end": share(lambda line: line.completed),
     "unfit answers refused": total(lambda line: line.unfit),
+    "reached the robot": total(lambda line: line.executed),
     "malformed reached the robot": total(lambda line: bool(line.malformed)),
 }
 EFFORT: dict[str, Column] = {
@@ -81,7 +82,8 @@ def markdown(model: str, lines: Sequence[Line], wanted: int) -> str:
         f"# Sub-task requests, {model}",
         f"{len(reasoning)} of {wanted} reasoning questions and {len(controller)} of {wanted} controller questions. "
         "Shares of questions with Wilson 95 % intervals; effort as median / 95th percentile of a question, its "
-        "repairs included.",
+        "repairs included. Malformed is what the checks beside the gate object to: the accepted sequence's JSON, the "
+        "key points at the robot's door, every command to its servos.",
         "## Reasoning",
         _table({"all": reasoning} | _by_kind(reasoning), REASONING),
         "## Controller",
