@@ -56,7 +56,10 @@ def ask_reasoning(request: Request, table: Table, tape: Tape, key: str) -> Line:
         right = any(named == tuple(map(plain, meant.objects)) for meant in table.subtasks)
         kind = "done" if subtask.done else "cannot" if subtask.cannot else "act"
         told |= {"next": kind, "subtask": subtask.text, "objects": subtask.objects, "right": right}
-    return Line(key=key, role="reasoning", asked=table.instruction, **_about(request, tape.emptied()), **told)
+    about = _about(request, tape.emptied())
+    # It may be asked twice, the second time with measurements: the request fits where both answers do.
+    told |= {"fits_first": not about["unfit"], "fits": failure is None}
+    return Line(key=key, role="reasoning", asked=table.instruction, **about | told)
 
 
 def ask_controller(
@@ -83,6 +86,9 @@ def ask_controller(
         role="controller",
         asked=subtask.text,
         **_about(request, exchanges),
+        # Of the first question: what is asked after a refusal by the gate counts as passing it or not.
+        fits_first=bool(exchanges) and not exchanges[0].complaints,
+        fits=bool(exchanges) and exchanges[0].answer is not None,
         stage=notes.stage,
         reason=one_line(notes.reason, 500),
         source=source,
@@ -103,8 +109,6 @@ def _about(request: Request, exchanges: Sequence[Exchange]) -> dict[str, Any]:
         "request": request.number,
         "task": request.case.task,
         "kind": request.case.kind,
-        "fits_first": bool(exchanges) and not exchanges[0].complaints,
-        "fits": bool(exchanges) and exchanges[0].answer is not None,
         "unfit": len(complaints),
         "complaint": one_line(complaints[0], 300) if complaints else "",
         "calls": sum(exchange.attempts for exchange in exchanges),

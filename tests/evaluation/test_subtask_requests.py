@@ -111,6 +111,13 @@ def test_an_answer_that_is_repaired_counts_as_repaired(tmp_path: Path) -> None:
         assert (line.fits_first, line.fits, line.unfit, line.calls) == (False, True, 1, 2)
 
 
+def test_a_request_that_fails_after_measurements_fits_neither_at_first_nor_later(tmp_path: Path) -> None:
+    with answering([ACTS | {"next": "measure"}, INVENTS], [PLACES]) as server:
+        run(settings(server, tmp_path, limit=1))
+    (reasoning,) = lines(tmp_path)
+    assert (reasoning.fits_first, reasoning.fits, reasoning.unfit, reasoning.calls) == (False, False, 3, 4)
+
+
 def test_a_sequence_that_the_gate_refuses_goes_back_and_is_no_first_pass(tmp_path: Path) -> None:
     with answering([ACTS], [FAR_OFF, PLACES]) as server:
         run(settings(server, tmp_path))
