@@ -6,7 +6,7 @@ squared, returns are missing out of range, at depth edges (one imager is occlude
 
 from __future__ import annotations
 
-from dataclasses import dataclass
+from dataclasses import dataclass, replace
 
 import cv2
 import numpy as np
@@ -44,6 +44,10 @@ class CameraSpec:
     def fovy(self) -> float:
         """Vertical field of view, degrees (MuJoCo's unit)."""
         return float(np.degrees(2 * np.arctan2(self.height / 2, self.focal_length)))
+
+    def resized(self, width: int, height: int) -> CameraSpec:
+        """The same camera with smaller or larger pixels: the vertical field of view stays, the sides may be cut off."""
+        return replace(self, width=width, height=height, focal_length=self.focal_length * height / self.height)
 
 
 MAIN_CAMERA = CameraSpec("main", eye=(0.68, 0.0, 0.62), target=(0.26, 0.0, 0.0))

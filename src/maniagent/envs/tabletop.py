@@ -234,12 +234,23 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         """Pictures from all cameras, noisy as real ones, and the robot's state."""
         frames: dict[str, CameraFrame] = {}
         for camera in self.cameras:
-            rgb, depth = self._render(camera, depth=True)
-            if self.noise is not None:
-                depth = self.noise.depth(depth, camera.focal_length, self.np_random)
-                rgb = self.noise.colour(rgb, self.np_random)
+            rgb, depth = self.take(camera, depth=True, rng=self.np_random)
             frames[camera.name] = CameraFrame(camera.name, rgb, depth, camera.K, camera.T_base_camera)
         return Observation(frames, self.cameras[0].name, self.robot_state())
+
+    def take(
+        self, camera: CameraSpec, *, depth: bool, rng: np.random.Generator | None
+    ) -> tuple[NDArray[np.uint8], NDArray[np.float32]]:
+        """A picture by one of `cameras`, or by its `resized` self: RGB (H, W, 3) and z-depth (H, W) in metres.
+
+        `rng` draws the noise; None leaves it out. Without `depth`, that is empty. The simulation is left as it is.
+        """
+        rgb, z = self._render(camera, depth)
+        if self.noise is None or rng is None:
+            return rgb, z
+        if depth:
+            z = self.noise.depth(z, camera.focal_length, rng)
+        return self.noise.colour(rgb, rng), z
 
     # True state ---------------------------------------------------------------------------------------------------
 
