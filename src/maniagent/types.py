@@ -317,12 +317,15 @@ class Orientation(_Written):
     kind: Literal["grasp", "top-down", "turn", "align", "keep"] = "keep"
     """grasp: as the best grasp of object `index`. top-down: straight down, closing axis at `yaw`. turn: the
     orientation of the step before, turned by `yaw` about the vertical. align: turned about the vertical until the
-    long side of what is in the gripper points along `yaw`, counter-clockwise from the viewer's right; the shorter way
-    round unless `end` says which end shall point there. keep: as at the step before."""
+    long side of what is in the gripper points along `yaw`, counter-clockwise from the viewer's right or, with `frame`
+    "base", from base x; the shorter way round unless `end` says which end shall point there. keep: as at the step
+    before."""
     index: Annotated[int, Field(ge=0, le=63)] | None = None
     yaw: Radians = 0.0
     end: Radians | None = None
-    """For align: the end that pointed nearest to this direction (from the right, as `yaw`) when it was taken."""
+    """For align: the end that pointed nearest to this direction (measured as `yaw` is) when it was taken."""
+    frame: Literal["viewer", "base"] = "viewer"
+    """For align: what `yaw` and `end` count from."""
 
     @model_validator(mode="after")
     def _grasp_has_index(self) -> Orientation:

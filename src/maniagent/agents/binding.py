@@ -105,12 +105,13 @@ class _Binder:
         if self._taken is None:
             raise FormatFailure(f"{self._step}: nothing is in the gripper there that could be aligned.")
         index, T_base_taken = self._taken
-        right = float(np.arctan2(self._viewpoint.right[1], self._viewpoint.right[0]))
+        right = self._viewpoint.right if wanted.frame == "viewer" else np.array([1.0, 0.0])
+        zero = float(np.arctan2(right[1], right[0]))
         axis = self._object(index).yaw
-        turn = wrap_angle(right + wanted.yaw - axis, np.pi)
+        turn = wrap_angle(zero + wanted.yaw - axis, np.pi)
         if wanted.end is not None:
-            pointing = axis if np.cos(axis - right - wanted.end) >= 0.0 else axis + np.pi
-            turn = wrap_angle(right + wanted.yaw - pointing)
+            pointing = axis if np.cos(axis - zero - wanted.end) >= 0.0 else axis + np.pi
+            turn = wrap_angle(zero + wanted.yaw - pointing)
         return rotation_z(turn) @ T_base_taken[:3, :3]
 
     def _target(self, step: ActionStep, rotation: FloatArray) -> FloatArray:

@@ -32,6 +32,7 @@ from .binding import bind
 from .events import EventLog
 from .memory import Memory
 from .protocols import Agents, Located
+from .supports import allow_supports
 
 
 @dataclass(frozen=True)
@@ -208,7 +209,7 @@ class _Run:
                 self._tell(refusal)
             try:
                 with self.timed("planning"):
-                    objects, keypoints = self._bind_and_check(sequence, located.objects, boxes, viewpoint)
+                    objects, keypoints = self._bind_and_check(sequence, located, boxes, viewpoint)
             except MotionRejected as failure:
                 refused, refusal = sequence, MotionRejected(_by_name(str(failure), located))
             except (FormatFailure, GraspFailure) as failure:
@@ -222,12 +223,12 @@ class _Run:
         self.log.emit("failed", turn=self.turn, stage=str(failure.stage), reason=str(failure))
 
     def _bind_and_check(
-        self, sequence: ActionSequence, objects: Sequence[ObjectInfo], boxes: Boxes, viewpoint: Viewpoint
+        self, sequence: ActionSequence, located: Located, boxes: Boxes, viewpoint: Viewpoint
     ) -> tuple[tuple[ObjectInfo, ...], tuple[KeyPoint, ...]]:
         """Bind to the best grasps that the robot can reach; raises the first choice's rejection where none is."""
         first_rejection: MotionRejected | None = None
-        for choice in _grasp_choices(objects, self.budget.grasps):
-            keypoints = bind(sequence, choice, viewpoint)
+        for choice in _grasp_choices(located.objects, self.budget.grasps):
+            keypoints = allow_supports(bind(sequence, choice, viewpoint), (*choice, *located.surroundings))
             try:
                 self.robot.check(keypoints, boxes)
             except MotionRejected as rejection:
