@@ -156,7 +156,12 @@ def test_a_pepper_is_put_on_the_plate_by_what_a_model_writes() -> None:
     judged = model.asked[-1].parts[0]
     assert "the arm made every movement" in judged
     measured = judged.partition("Measured: what looks like the red pepper is now at")[2]
-    for told in ("pointing away or towards the viewer", "from where it was before", "turned by", "its middle is over where the plate was"):
+    for told in (
+        "pointing away or towards the viewer",
+        "from where it was before",
+        "turned by",
+        "its middle is over where the plate was",
+    ):
         assert told in measured
 
 
@@ -430,7 +435,7 @@ def steps(*kept: int, **changed: Any) -> Json:
     ("answer", "said"),
     [
         (steps(0, 1, object=7), "there is no object 7; the objects are [0, 1]"),
-        (steps(0, 1, object=1), "Only object 0 can be grasped"),
+        (steps(0, 1, object=1), "only object 0 can be grasped"),
         (steps(), "at least 1"),
         (steps(0, 1, 2), "still in the gripper at the end"),
         (steps(0, up=float("nan")), "finite"),

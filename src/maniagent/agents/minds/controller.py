@@ -56,12 +56,16 @@ class MindControllerAgent:
 
 def _check(written: Written, objects: Sequence[ObjectInfo], viewpoint: Viewpoint) -> None:
     """Raise Unfit unless the sequence binds, and puts down what it brings to another object."""
+    for number, step in enumerate(written.steps, 1):
+        if step.to == "grasp" and step.object in range(1, len(objects)):
+            raise Unfit(
+                f"Step {number} ({step.do}) goes to the grasp of object {step.object}, but only object 0 can be grasped. "
+                f'To put something onto object {step.object}, use "to":"surface".'
+            )
     sequence = to_sequence(written)
     try:
         keypoints = bind(sequence, objects, viewpoint)
-    except GraspFailure as failure:
-        raise Unfit(f"{failure} Only object 0 can be grasped.") from failure
-    except FormatFailure as failure:
+    except (FormatFailure, GraspFailure) as failure:
         raise Unfit(str(failure)) from failure
     last = keypoints[-1]
     if len(objects) > 1 and last.held is not None and last.gripper != "open":

@@ -76,10 +76,11 @@ def _check_objects(objects: Sequence[str], names: Sequence[str]) -> None:
     for name in objects:
         if plain(name) not in known:
             near = difflib.get_close_matches(plain(name), known, n=1)
-            hint = f" Did you mean {known[near[0]]!r}?" if near else ""
+            if near:
+                raise Unfit(f"The scene lists no {one_line(name)!r}. If you mean {known[near[0]]!r}, write just that.")
             raise Unfit(
-                f"The scene lists no {one_line(name)!r}.{hint} It lists: {', '.join(names) or 'nothing'}. Use these "
-                "names; if what is needed isn't there, do without it or answer cannot."
+                f"The scene lists no {one_line(name)!r}. It lists: {', '.join(names) or 'nothing'}. Use these names; "
+                "if what is needed isn't there, do without it or answer cannot."
             )
     if len({plain(name) for name in objects}) < len(objects):
         raise Unfit("objects names the same thing twice. Name each once: first what moves, then what it is brought to.")
