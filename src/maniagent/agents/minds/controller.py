@@ -59,8 +59,8 @@ def _check(written: Written, objects: Sequence[ObjectInfo], viewpoint: Viewpoint
     for number, step in enumerate(written.steps, 1):
         if step.to == "grasp" and step.object in range(1, len(objects)):
             raise Unfit(
-                f"Step {number} ({step.do}) goes to the grasp of object {step.object}, but only object 0 can be grasped. "
-                f'To put something onto object {step.object}, use "to":"surface".'
+                f"Step {number} ({step.do}) goes to the grasp of object {step.object}; only object 0 can be grasped. "
+                'To put something onto another object, use "to":"surface".'
             )
     sequence = to_sequence(written)
     try:
