@@ -9,7 +9,7 @@ from typing import TYPE_CHECKING, Annotated
 import typer
 
 from . import __version__
-from .commands import cache, models, prompts, simpler
+from .commands import cache, data, models, prompts, simpler
 from .commands.common import ACHIEVED, NOT_ACHIEVED, WRONG_USE, Json, errors_told
 from .commands.crew import (
     ActorOption,
@@ -37,6 +37,7 @@ app = typer.Typer(
     epilog="Start with [bold]maniagent doctor[/], then [bold]maniagent run --task carrot-on-plate[/].",
 )
 app.add_typer(cache.app, name="cache")
+app.add_typer(data.app, name="data")
 app.add_typer(models.app, name="models")
 app.add_typer(prompts.app, name="prompts")
 app.add_typer(simpler.app, name="simpler")
