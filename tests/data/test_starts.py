@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from dataclasses import replace
 
 import numpy as np
 import pytest
@@ -60,18 +61,31 @@ def test_a_plan_is_the_beginning_of_a_longer_one(
 
 
 @pytest.mark.parametrize("pattern", Pattern)
+@pytest.mark.parametrize("width", [None, 0.03])
 def test_every_start_can_be_picked_is_seen_whole_and_is_clear_of_what_is_kept_free(
-    region: Region, pattern: Pattern
+    region: Region, pattern: Pattern, width: float | None
 ) -> None:
-    xy, yaw = poses(plan_starts(region, 500, pattern, seed=5))
+    region = replace(region, width=width)
+    radius = region.reach.radius
+    xy, yaw = poses(plan_starts(region, 150, pattern, seed=5))
     assert region.reach.contains(xy, yaw).all()
     seen = region.workspace
-    assert np.all(xy >= np.array([seen.x[0], seen.y[0]]) + region.reach.radius)
-    assert np.all(xy <= np.array([seen.x[1], seen.y[1]]) - region.reach.radius)
-    outline = np.array([(u, v) for u in np.linspace(-1, 1, 41) for v in np.linspace(-1, 1, 41)]) * PLATE.extent[:2] / 2
-    outline = outline @ rotation_z(PLATE.yaw)[:2, :2].T + PLATE.centre[:2]
-    assert np.linalg.norm(xy[:, None] - outline, axis=-1).min() >= region.reach.radius + GAP
+    assert np.all(xy >= np.array([seen.x[0], seen.y[0]]) + radius)
+    assert np.all(xy <= np.array([seen.x[1], seen.y[1]]) - radius)
+    side = np.stack(np.meshgrid(np.linspace(-1, 1, 31), np.linspace(-1, 1, 31)), -1).reshape(-1, 2)
+    plate = (side * PLATE.extent[:2] / 2) @ rotation_z(PLATE.yaw)[:2, :2].T + PLATE.centre[:2]
+    for place, turn in zip(xy, yaw, strict=True):
+        axis = np.linspace(-1, 1, 30)[:, None] * (radius - (width or 2 * radius) / 2) * [np.cos(turn), np.sin(turn)]
+        between = np.linalg.norm((place + axis)[:, None] - plate, axis=-1).min() - (width or 2 * radius) / 2
+        assert between >= GAP - 0.003
     assert np.all((yaw > -math.pi) & (yaw <= math.pi))
+
+
+def test_a_narrow_thing_may_lie_nearer_to_what_is_kept_free(region: Region) -> None:
+    narrow = replace(region, width=0.03)
+    xy, yaw = poses(plan_starts(replace(region, kept_free=()), 3000, Pattern.SOBOL))
+    assert np.all(narrow.contains(xy, yaw) >= region.contains(xy, yaw))
+    assert narrow.contains(xy, yaw).sum() > 1.1 * region.contains(xy, yaw).sum()
 
 
 def test_sobol_is_more_even_than_random_also_after_what_is_out_of_reach_is_left_out(region: Region) -> None:

@@ -16,10 +16,12 @@ from ..perception.views import Workspace
 from ..types import BoolArray, OrientedBox
 from .reach import Reach
 
-GAP = 0.025
-"""m between the object and what it is kept clear of, at least: room for a finger."""
+GAP = 0.03
+"""m between the object and what it is kept clear of, at least: room for an open finger."""
+_DISCS = 7
+"""That stand for an object."""
 _VAIN = 4000
-"""Draws in a row without a place that will do, until the region is given up."""
+"""Draws for each place that will do; where it takes more, the region is given up."""
 _BLOCK = 8
 """log2 of the points first taken from the Sobol sequence."""
 _GRID_BLOCKS = 9
@@ -64,6 +66,8 @@ class Region:
     x: Interval | None = None
     """m, base frame: bounds on the object's middle; None for no more than reach and sight impose."""
     y: Interval | None = None
+    width: float | None = None
+    """m, of the object's footprint across its yaw; None: as wide as it is long."""
     kept_free: tuple[OrientedBox, ...] = ()
     """What the object must not touch when an episode begins, such as the plate that it goes to."""
 
@@ -88,8 +92,16 @@ class Region:
         low, high = self.bounds
         inside = np.all((xy >= low) & (xy <= high), axis=-1) & self.reach.contains(xy, yaw)
         for box in self.kept_free:
-            inside &= _distance(xy, box) >= self.reach.radius + GAP
+            inside &= self._clear_of(box, xy, yaw)
         return inside
+
+    def _clear_of(self, box: OrientedBox, xy: FloatArray, yaw: FloatArray) -> BoolArray:
+        """Whether discs along the object's length keep their distance from a box."""
+        long = 2 * self.reach.radius
+        wide = long if self.width is None else min(self.width, long)
+        along = np.stack([np.cos(yaw), np.sin(yaw)], axis=-1)
+        offsets = np.linspace(-0.5, 0.5, _DISCS) * (long - wide)
+        return np.all([_distance(xy + d * along, box) >= wide / 2 + GAP for d in offsets], axis=0)
 
 
 def plan_starts(
@@ -137,19 +149,19 @@ def _random(dimensions: int, seed: int) -> Iterator[FloatArray]:
 def _possible(region: Region, stream: Iterator[FloatArray], fixed_yaw: float | None) -> Iterator[FloatArray]:
     """Poses (3,) of the region, in the order of the points (N, 3) of the unit cube that they come from.
 
-    Leaving out what lies outside takes nothing from the evenness inside: the sequence fills every part of the
-    rectangle in proportion to its size, so also every part of the region.
+    Leaving out what lies outside takes little from the evenness inside: a sequence that fills every part of the
+    rectangle in proportion to its size so fills every part of the region.
     """
     low, high = region.bounds
-    vain = 0
+    drawn = found = 0
     for block in stream:
         poses = np.concatenate([low + block[:, :2] * (high - low), 2 * np.pi * block[:, 2:] - np.pi], axis=1)
         if fixed_yaw is not None:
             poses[:, 2] = fixed_yaw
         good = region.contains(poses[:, :2], poses[:, 2])
         yield from poses[good]
-        vain = 0 if good.any() else vain + len(block)
-        if vain >= _VAIN:
+        drawn, found = drawn + len(block), found + int(good.sum())
+        if drawn > _VAIN * (found + 1):
             raise UsageError(_nowhere(region))
 
 
