@@ -50,7 +50,7 @@ class Staging:
             raise UsageError(f"{self.folder} can't be written to. Name another folder, or let yourself write there.")
 
     def commit(self, info: EpisodeInfo, recording: Recording | None) -> Path:
-        """Keep an episode; it is on the disk when this returns, and nothing of it is there where this raises.
+        """Keep an episode: it is on the disk when this returns, and no half of it is there where this raises.
 
         `recording` is None where there is none: of an attempt that failed before anything moved.
 
