@@ -19,7 +19,7 @@ from ..video import TOLERANCE
 _STILL_FROM = 10
 """Frames; a shorter episode may well hold still."""
 _SPIKE = 100.0
-"""A value this many times the width of the middle 98 % away from the median is no motion."""
+"""A value this many times the usual motion of an episode away from the usual place is no motion."""
 _OPENING = (-0.01, 0.2)
 """m, between the fingers; a hair below 0 is a calibration."""
 
@@ -158,7 +158,8 @@ class Motion:
 
     def _spikes(self, feature: Feature, episodes: NDArray[Any]) -> None:
         number, low, middle, high, reach = episodes.transpose(1, 0, 2)
-        centre, width = np.median(middle, axis=0), high.max(axis=0) - low.min(axis=0)
+        centre = np.median(middle, axis=0)
+        width = np.median(high - low, axis=0) + np.ptp(np.percentile(middle, (10, 90), axis=0), axis=0)
         far = np.abs(reach - centre) > _SPIKE * np.where(width > 0, width, np.inf)
         for i, dimension in zip(*np.nonzero(far), strict=True):
             name = feature.names[dimension] if dimension < len(feature.names) else dimension
