@@ -21,7 +21,7 @@ from .interpreter import HOW, find_interpreter
 
 SCRIPT = Path(__file__).with_name("writer.py")
 CODEC = "h264"
-"""The videos' codec: on a processor many times faster than lerobot's default, libsvtav1 (docs/data.md has figures)."""
+"""The videos' codec: a fifth less processor time than lerobot's default, libsvtav1, and every player knows it."""
 
 
 class WriterFailure(ManiAgentError):

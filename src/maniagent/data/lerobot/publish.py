@@ -14,6 +14,7 @@ from pydantic import ValidationError
 
 from ...errors import SetupError, UsageError
 from ..episode import EpisodeInfo
+from ..staging import INFO, Staging
 from .client import CODEC, Writer
 from .generation import locked, next_generation, recover
 from .ledger import read_ledger, write_ledger
@@ -116,12 +117,11 @@ def _present(dataset: Path) -> list[EpisodeInfo]:
 
 def _staged(collection: Path) -> list[_Staged]:
     found = []
-    for folder in sorted((collection / STAGED).glob("[!.]*")):
-        path = folder / "episode.json"
+    for folder in Staging(collection / STAGED).episodes():
         try:
-            info = EpisodeInfo.model_validate_json(path.read_text())
-        except (OSError, ValidationError) as error:
-            raise UsageError(f"{path} can't be read: {error}. Move the episode out of the folder.") from error
+            info = EpisodeInfo.model_validate_json((folder / INFO).read_bytes())
+        except ValidationError as error:
+            raise UsageError(f"{folder / INFO} can't be read: {error}. Move the episode out of the folder.") from error
         if info.label == "valid":
             found.append(_Staged(folder, info))
     return found
