@@ -2,7 +2,11 @@
 
 from __future__ import annotations
 
+import re
+import subprocess
+import sys
 from collections.abc import Iterator, Sequence
+from pathlib import Path
 from typing import Any
 
 import numpy as np
@@ -20,6 +24,7 @@ from maniagent.data.recording import (
     to_poses,
     to_recording,
 )
+from maniagent.data.staging import load
 from maniagent.envs.cameras import MAIN_CAMERA, SIDE_CAMERA, CameraSpec
 from maniagent.envs.scene import Scene
 from maniagent.envs.tabletop import TabletopEnv
@@ -191,6 +196,16 @@ def test_every_row_says_what_the_robot_was_doing() -> None:
     assert texts(by_move=False) == ("get ready", "lift the carrot", "lift the carrot", "lift the carrot")
 
 
+def test_rows_before_the_first_sub_task_belong_to_it() -> None:
+    robot = TellingRobot()
+    recorder = EpisodeRecorder(robot)
+    recorder.begin()
+    robot.tell(*moving(2))
+    recorder.subtask = "lift the carrot"
+    robot.tell(*moving(4)[2:])
+    assert recorder.finish().steps.subtasks == ("lift the carrot",) * 4
+
+
 def test_rows_may_tell_of_single_moves_instead() -> None:
     assert texts(by_move=True) == ("get ready", "lift the carrot", "Go up", "Go up")
 
@@ -293,6 +308,18 @@ def there_and_back(robot: SimulatedRobot) -> None:
     ]
     assert robot.execute(keypoints, {}).completed
     assert robot.go_home().completed
+
+
+@pytest.mark.slow
+def test_the_documented_example_records_an_episode(tmp_path: Path) -> None:
+    text = (Path(__file__).parents[2] / "docs/recording.md").read_text(encoding="utf-8")
+    (example,) = re.findall(r"^```python\n(.*?)^```", text, re.M | re.S)
+    subprocess.run([sys.executable, "-c", example], cwd=tmp_path, check=True)
+    info, recording = load(tmp_path / "staged/carrot-s3")
+    assert recording is not None
+    assert info.label == "valid"
+    assert set(recording.steps.subtasks) == {"put the carrot on the plate"}
+    assert recording.rgb["side"].shape == (len(recording.steps.time), 240, 320, 3)
 
 
 @pytest.mark.slow

@@ -84,7 +84,7 @@ def test_episodes_come_by_key_and_quarantine_is_apart(tmp_path: Path) -> None:
     for key in ("c", "a", "b-2", "b-10"):
         staging.commit(made_info(key), made_recording(T=2))
     odd = staging.quarantine(made_info("z", label="doubtful", reason="two carrots"), made_recording(T=2))
-    (tmp_path / ".draft").mkdir()
+    (tmp_path / ".draft.part").mkdir()
     assert [path.name for path in staging.episodes()] == ["a", "b-10", "b-2", "c"]
     assert staging.quarantined() == (odd,)
     assert odd.parent.name == "quarantine"
@@ -256,19 +256,19 @@ def test_sweeping_removes_drafts_and_nothing_else(tmp_path: Path) -> None:
     staging = Staging(tmp_path)
     kept = staging.commit(made_info("a"), made_recording(T=2))
     for place in (tmp_path, tmp_path / "quarantine"):
-        (place / ".b").mkdir()
-        (place / ".b" / "steps.npz").write_bytes(b"half")
-    (tmp_path / ".gitignore").write_text("*")
+        (place / ".b.part").mkdir()
+        (place / ".b.part" / "steps.npz").write_bytes(b"half")
+    (tmp_path / ".git").mkdir()
     assert staging.sweep() == 2
     assert staging.sweep() == 0
     assert staging.episodes() == (kept,)
-    assert (tmp_path / ".gitignore").exists()
+    assert (tmp_path / ".git").exists()
 
 
 def test_a_draft_that_was_left_is_written_anew(tmp_path: Path) -> None:
     staging = Staging(tmp_path)
-    (tmp_path / ".a").mkdir()
-    (tmp_path / ".a" / "rgb-old.npy").write_bytes(b"half")
+    (tmp_path / ".a.part").mkdir()
+    (tmp_path / ".a.part" / "rgb-old.npy").write_bytes(b"half")
     _, recording = load(staging.commit(made_info("a"), made_recording()))
     assert recording is not None
     assert set(recording.rgb) == {"main", "side"}

@@ -77,6 +77,9 @@ class EpisodeRecorder:
         kept = range(len(samples)) if self._settings.trim is None else self._moving_rows(samples)
         if not kept:
             raise StageFailure("Nothing moved while the episode was recorded.")
+        # What the robot did before it was told of a sub-task, it did to get ready for that.
+        first = next(filter(None, texts), "")
+        texts = [text or first for text in texts]
         return to_recording(samples[kept.start : kept.stop], texts[kept.start : kept.stop])
 
     def cancel(self) -> None:

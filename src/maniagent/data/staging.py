@@ -2,7 +2,7 @@
 
     <folder>/<key>/               an episode; what lies in it: episode.py
     <folder>/quarantine/<key>/    one that somebody should look at before it is used
-    <folder>/.<key>/              one that is being written, or was when its process was killed
+    <folder>/.<key>.part/         one that is being written, or was when its process was killed
 
 An episode is written under a name with a dot, forced onto the disk, and renamed: POSIX renames a folder in one piece,
 so that whoever is killed, at whatever moment, leaves whole episodes and perhaps one folder with a dot.
@@ -29,6 +29,7 @@ from .episode import EpisodeInfo, Recording, Steps
 
 INFO, STEPS = "episode.json", "steps.npz"
 QUARANTINE = "quarantine"
+_PART = ".part"
 _ARRAYS = ("time", "joints", "opening", "tcp", "joint_targets", "opening_target", "tcp_delta")
 _FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 _CAMERA = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
@@ -82,7 +83,7 @@ class Staging:
         To be called before anybody writes: what a living process is writing looks the same.
         """
         with _explained(self.folder):
-            left = [path for place in (self.folder, self.folder / QUARANTINE) for path in place.glob(".*/")]
+            left = [path for place in (self.folder, self.folder / QUARANTINE) for path in place.glob(f".*{_PART}/")]
             for path in left:
                 shutil.rmtree(path)
         return len(left)
@@ -95,7 +96,7 @@ class Staging:
                 raise UsageError(f"There is an episode {taken} already. Give every episode a key of its own.")
         if info.label == "failed" and not self._keep_failed:
             recording = None
-        final, draft = place / info.key, place / f".{info.key}"
+        final, draft = place / info.key, place / f".{info.key}{_PART}"
         size = 0 if recording is None else sum(array.nbytes for array in _pictures(recording).values())
         with _explained(final, size):
             try:
