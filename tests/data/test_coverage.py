@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from maniagent.data.chart import Chart
-from maniagent.data.coverage import COLOURS, REACHABLE, TABLE, Outcome, draw_coverage
+from maniagent.data.coverage import COLOURS, REACHABLE, TABLE, Tried, draw_coverage
 from maniagent.data.reach import Reach
 from maniagent.data.starts import Region, Start, plan_starts
 from maniagent.motion import ArmModel, MotionLimits
@@ -40,12 +40,12 @@ def colour_at(picture: Path, pixel: np.ndarray) -> tuple[int, ...]:
 def test_marks_lie_where_episodes_were_seen_to_begin(tmp_path: Path, region: Region, viewpoint: Viewpoint) -> None:
     planned = tuple(Start(i, (0.25, y), 0.4) for i, y in enumerate((-0.2, 0.0, 0.2)))
     began = ((0.22, -0.2), None, (0.25, 0.23))
-    outcomes = [Outcome(start, label, xy) for start, label, xy in zip(planned, COLOURS, began, strict=True)]
-    picture = draw_coverage(region, planned, outcomes, viewpoint, tmp_path / "new" / "coverage.png")
+    tried = [Tried(start.xy, label, xy) for start, label, xy in zip(planned, COLOURS, began, strict=True)]
+    picture = draw_coverage(region, planned, tried, viewpoint, tmp_path / "new" / "coverage.png")
     chart = chart_of(region, viewpoint)
-    for outcome in outcomes:
-        place = chart.pixel(np.array(outcome.began or outcome.start.xy))
-        assert colour_at(picture, place) == pytest.approx(COLOURS[outcome.label], abs=6)
+    for episode in tried:
+        place = chart.pixel(np.array(episode.began or episode.planned))
+        assert colour_at(picture, place) == pytest.approx(COLOURS[episode.label], abs=6)
 
 
 @pytest.mark.parametrize("viewpoint", [FROM_THE_FRONT, FROM_BEHIND, ASLANT])
@@ -68,18 +68,16 @@ def test_what_is_to_the_viewers_right_is_to_the_right_and_what_is_far_is_up(regi
 
 def test_the_same_collection_gives_the_same_picture(tmp_path: Path, region: Region) -> None:
     planned = plan_starts(region, 30)
-    outcomes = [Outcome(start, "valid", start.xy) for start in planned[:20]]
-    pictures = [
-        draw_coverage(region, planned, outcomes, FROM_THE_FRONT, tmp_path / name) for name in ("a.png", "b.png")
-    ]
+    tried = [Tried(start.xy, "valid", start.xy) for start in planned[:20]]
+    pictures = [draw_coverage(region, planned, tried, FROM_THE_FRONT, tmp_path / name) for name in ("a.png", "b.png")]
     assert pictures[0].read_bytes() == pictures[1].read_bytes()
 
 
 @pytest.mark.parametrize("count", [1, 1000])
 def test_few_and_many_starts_all_show(tmp_path: Path, region: Region, count: int) -> None:
     planned = plan_starts(region, count)
-    outcomes = [Outcome(start, "failed", start.xy) for start in planned]
-    picture = draw_coverage(region, planned, outcomes, FROM_THE_FRONT, tmp_path / "coverage.png")
+    tried = [Tried(start.xy, "failed", start.xy) for start in planned]
+    picture = draw_coverage(region, planned, tried, FROM_THE_FRONT, tmp_path / "coverage.png")
     chart = chart_of(region, FROM_THE_FRONT)
     with Image.open(picture) as image:
         pixels = np.asarray(image).astype(int)

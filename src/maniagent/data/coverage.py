@@ -6,6 +6,7 @@ from collections.abc import Mapping, Sequence
 from dataclasses import dataclass
 from functools import partial
 from pathlib import Path
+from typing import Self
 
 import numpy as np
 
@@ -13,7 +14,7 @@ from ..geometry import FloatArray, rotation_z
 from ..perception.viewpoint import Viewpoint
 from ..types import OrientedBox
 from .chart import SCALE, Chart, Colour, Entry
-from .episode import Label
+from .episode import EpisodeInfo, Label
 from .starts import Region, Start
 
 TABLE, REACHABLE, KEPT_FREE = (246, 246, 244), (206, 224, 242), (240, 228, 206)
@@ -30,17 +31,23 @@ _YAWS = 12
 
 
 @dataclass(frozen=True)
-class Outcome:
-    """What became of one episode."""
+class Tried:
+    """An episode and what became of it."""
 
-    start: Start
+    planned: tuple[float, float]
+    """m, base frame: where it was to begin."""
     label: Label
     began: tuple[float, float] | None = None
-    """m, base frame: where the object was seen to begin; None where it wasn't seen."""
+    """m, base frame: where the object was seen to begin; None where that isn't known."""
+
+    @classmethod
+    def of(cls, info: EpisodeInfo, began: tuple[float, float] | None = None) -> Self:
+        """An episode as it is staged."""
+        return cls(info.start[:2], info.label, began)
 
 
 def draw_coverage(
-    region: Region, planned: Sequence[Start], outcomes: Sequence[Outcome], viewpoint: Viewpoint, out: Path
+    region: Region, planned: Sequence[Start], tried: Sequence[Tried], viewpoint: Viewpoint, out: Path
 ) -> Path:
     """Draw the table from above, what is far from the viewer up, as a PNG at `out`, and return `out`.
 
@@ -61,10 +68,10 @@ def draw_coverage(
     for start in planned:
         _draw_plan(chart, start, size)
     for label in COLOURS:
-        for outcome in (outcome for outcome in outcomes if outcome.label == label):
-            _draw_outcome(chart, outcome, size)
+        for episode in (episode for episode in tried if episode.label == label):
+            _draw_tried(chart, episode, size)
     chart.title("Where episodes begin")
-    chart.legend(_legend(planned, outcomes, kept_free=bool(region.kept_free)))
+    chart.legend(_legend(planned, tried, kept_free=bool(region.kept_free)))
     out.parent.mkdir(parents=True, exist_ok=True)
     chart.finished().save(out)
     return out
@@ -98,11 +105,10 @@ def _draw_plan(chart: Chart, start: Start, size: float) -> None:
     chart.disc(chart.pixel(xy), size, None, PLANNED, width)
 
 
-def _draw_outcome(chart: Chart, outcome: Outcome, size: float) -> None:
-    planned = chart.pixel(np.array(outcome.start.xy))
-    began = planned if outcome.began is None else chart.pixel(np.array(outcome.began))
-    chart.line(planned, began, COLOURS[outcome.label], 1.5)
-    _draw_label(chart, began, outcome.label, 0.62 * size)
+def _draw_tried(chart: Chart, episode: Tried, size: float) -> None:
+    planned, began = (chart.pixel(np.array(xy)) for xy in (episode.planned, episode.began or episode.planned))
+    chart.line(planned, began, COLOURS[episode.label], 1.5)
+    _draw_label(chart, began, episode.label, 0.62 * size)
 
 
 def _draw_label(chart: Chart, place: FloatArray, label: Label, size: float) -> None:
@@ -118,17 +124,17 @@ def _draw_label(chart: Chart, place: FloatArray, label: Label, size: float) -> N
                 chart.line(place - tip, place + tip, halo, width)
 
 
-def _legend(planned: Sequence[Start], outcomes: Sequence[Outcome], *, kept_free: bool) -> list[Entry]:
-    begun = len({outcome.start.index for outcome in outcomes})
-    entries = [Entry(f"{len(planned)} planned, {begun} tried", _planned_sample)]
+def _legend(planned: Sequence[Start], tried: Sequence[Tried], *, kept_free: bool) -> list[Entry]:
+    starts = len({episode.planned for episode in tried})
+    entries = [Entry(f"{len(planned)} planned, {starts} tried", _planned_sample)]
     for label in COLOURS:
-        count = sum(outcome.label == label for outcome in outcomes)
+        count = sum(episode.label == label for episode in tried)
         entries.append(Entry(f"{count} {label}", partial(_draw_label, label=label, size=6.5)))
     entries.append(Entry("within reach and sight", partial(_swatch, colour=REACHABLE)))
     entries.append(Entry("so at some yaws only", partial(_swatch, colour=AT_SOME_YAWS)))
     if kept_free:
         entries.append(Entry("kept free", partial(_swatch, colour=KEPT_FREE)))
-    off = [np.hypot(*np.subtract(o.began, o.start.xy)) * 1000 for o in outcomes if o.began is not None]
+    off = [1000 * np.hypot(*np.subtract(e.began, e.planned)) for e in tried if e.began is not None]
     if off:
         entries += [Entry("Began off the plan by"), Entry(f"{np.median(off):.0f} mm (median), {max(off):.0f} at most")]
     return entries
