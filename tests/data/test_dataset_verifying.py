@@ -103,6 +103,18 @@ def test_wrong_numbers_are_found_where_they_are(
     assert said in " ".join(finding.what for check in report.checks for finding in check.findings)
 
 
+def test_degrees_where_radians_are_wanted_are_one_warning(dataset: Path) -> None:
+    for file in (FIRST, SECOND):
+        edit_column(dataset / file, "action", lambda cells: cells.__setitem__(slice(None), _degrees(cells)))
+    found = [finding.what for finding in named(verify(dataset))["motion"].findings]
+    assert len(found) == 6
+    assert found[0].startswith("action, waist goes from -")
+
+
+def _degrees(cells: list[Any]) -> list[Any]:
+    return [[*np.degrees(cell[:6]).tolist(), cell[6]] for cell in cells]
+
+
 def test_an_episode_that_is_there_twice_is_found(tmp_path: Path) -> None:
     dataset = made_dataset(tmp_path / "twice", (12, 12))
     for column in ("observation.state", "action"):

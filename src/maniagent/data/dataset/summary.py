@@ -2,6 +2,7 @@
 
 from __future__ import annotations
 
+import math
 from collections import Counter
 from collections.abc import Iterable, Sequence
 from dataclasses import asdict, dataclass
@@ -15,6 +16,8 @@ from .checks.statistics import Moments
 from .layout import BOOKKEEPING, Feature
 from .reading import Dataset, read_collected
 from .video import probe
+
+_MEASURES = ("low", "mean", "high", "std")
 
 
 @dataclass(frozen=True)
@@ -84,8 +87,11 @@ class DatasetSummary:
     """None where another program collected the dataset."""
 
     def to_plain(self) -> dict[str, Any]:
-        """For JSON."""
-        return asdict(self)
+        """For JSON, which has no numbers but finite ones: null stands for the others."""
+        plain = asdict(self)
+        for dimension in plain["dimensions"]:
+            dimension |= {name: None for name in _MEASURES if not math.isfinite(dimension[name])}
+        return plain
 
 
 def summarise(dataset: Dataset) -> DatasetSummary:

@@ -85,9 +85,9 @@ def _opened(path: Path, where: str) -> Any:
         raise DatasetError(where, "is missing", _AGAIN) from None
     except (av.FFmpegError, OSError, ValueError) as error:
         raise _broken(where, error) from error
-    if not container.streams.video:
+    if not container.streams.video or container.streams.video[0].codec_context is None:
         container.close()
-        raise DatasetError(where, "holds no video", _AGAIN)
+        raise DatasetError(where, "holds no video that can be decoded", _AGAIN)
     return container
 
 

@@ -20,6 +20,8 @@ _STILL_FROM = 10
 """Frames; a shorter episode may well hold still."""
 _SPIKE = 100.0
 """A value this many times the usual motion of an episode away from the usual place is no motion."""
+_TURN = 2 * np.pi
+"""rad, either way; no joint of the arm goes farther."""
 _OPENING = (-0.01, 0.2)
 """m, between the fingers; a hair below 0 is a calibration."""
 
@@ -124,7 +126,6 @@ class Motion:
     def __init__(self, info: Info) -> None:
         self._features = [feature for feature in info.features.values() if _moves(feature)]
         self._seen: dict[str, list[NDArray[Any]]] = {feature.name: [] for feature in self._features}
-        self._episodes: list[tuple[int, int]] = []
         self.check = Check("motion", "Do states and actions move, and within bounds?")
 
     def visit(self, rows: EpisodeRows) -> None:
@@ -137,7 +138,6 @@ class Motion:
             if len(column) >= _STILL_FROM and (column == column[0]).all():
                 what = f"{feature.name} is the same in all {len(column)} frames"
                 self.check.warning(rows.episode.name, what, "A sensor or a controller stood still: look at it.")
-            self._bounds(rows.episode, feature, column)
             self._seen[feature.name].append(_extremes(column, rows.episode.index))
 
     def finish(self) -> None:
@@ -145,19 +145,22 @@ class Motion:
         for feature in self._features:
             if not self._seen[feature.name]:
                 continue
-            episodes = np.stack(self._seen[feature.name])  # (E, 5, D): number, low, median, high, and the widest reach
+            episodes = np.stack(self._seen[feature.name])
             self._spikes(feature, episodes)
+            if set(JOINTS) <= set(feature.names):
+                self._bounds(feature, episodes)
 
-    def _bounds(self, episode: Episode, feature: Feature, column: NDArray[Any]) -> None:
-        """Our own joints and fingers, known by their names."""
-        for i, name in enumerate(feature.names[: column.shape[1]]):
-            low, high = (-2 * np.pi, 2 * np.pi) if name in JOINTS else _OPENING if name == "opening" else (None, None)
-            if low is not None and (column[:, i].min() < low or column[:, i].max() > high):
-                reach = f"{column[:, i].min():.3g} to {column[:, i].max():.3g}"
-                self.check.warning(episode.name, f"{feature.name}, {name}: {reach}", "Are the units rad and m?")
+    def _bounds(self, feature: Feature, episodes: NDArray[Any]) -> None:
+        """Our own robot's joints and fingers, known by their names."""
+        low, high = episodes[:, 5].min(axis=0), episodes[:, 6].max(axis=0)
+        for i, name in enumerate(feature.names[: len(low)]):
+            least, most = _OPENING if name == "opening" else (-_TURN, _TURN)
+            if name in (*JOINTS, "opening") and (low[i] < least or high[i] > most):
+                what = f"{feature.name}, {name} goes from {low[i]:.3g} to {high[i]:.3g}"
+                self.check.warning("data", what, "Are its units rad and m?")
 
     def _spikes(self, feature: Feature, episodes: NDArray[Any]) -> None:
-        number, low, middle, high, reach = episodes.transpose(1, 0, 2)
+        number, low, middle, high, reach, *_ = episodes.transpose(1, 0, 2)
         centre = np.median(middle, axis=0)
         width = np.median(high - low, axis=0) + np.ptp(np.percentile(middle, (10, 90), axis=0), axis=0)
         far = np.abs(reach - centre) > _SPIKE * np.where(width > 0, width, np.inf)
@@ -225,9 +228,10 @@ def _moves(feature: Feature) -> bool:
 
 
 def _extremes(column: NDArray[Any], number: int) -> NDArray[Any]:
-    """(5, D): the episode's number, 1st percentile, median, 99th percentile, and what is farthest from the median."""
+    """(7, D): episode's number, 1st percentile, median, 99th percentile, what is farthest from it, least, and most."""
     column = column.astype(float)
     low, middle, high = np.percentile(column, (1, 50, 99), axis=0)
     farthest = np.abs(column - middle).argmax(axis=0)
     reach = np.take_along_axis(column, farthest[None], axis=0)[0]
-    return np.stack([np.full(len(middle), float(number)), low, middle, high, reach])
+    ends = column.min(axis=0), column.max(axis=0)
+    return np.stack([np.full(len(middle), float(number)), low, middle, high, reach, *ends])

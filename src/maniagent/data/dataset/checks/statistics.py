@@ -33,9 +33,10 @@ class Moments:
     @classmethod
     def of(cls, rows: NDArray[Any]) -> Moments:
         """Of (T, D) or (T,) rows, T > 0."""
-        table = rows.reshape(len(rows), -1).astype(np.float64)
-        mean = table.mean(axis=0)
-        return cls(len(table), table.min(axis=0), table.max(axis=0), mean, ((table - mean) ** 2).sum(axis=0))
+        with np.errstate(all="ignore"):  # of what isn't finite nothing is wanted but that
+            table = rows.reshape(len(rows), -1).astype(np.float64)
+            mean = table.mean(axis=0)
+            return cls(len(table), table.min(axis=0), table.max(axis=0), mean, ((table - mean) ** 2).sum(axis=0))
 
     def __add__(self, other: Moments) -> Moments:
         """Chan, Golub and LeVeque 1983: the pairwise update, which loses no digits."""
