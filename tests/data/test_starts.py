@@ -171,3 +171,8 @@ def test_senseless_arguments_are_refused(region: Region, reach: Reach) -> None:
             plan_starts(region, count, Pattern.RANDOM, seed)
     with pytest.raises(UsageError, match="smaller one first"):
         Region(reach, x=(0.3, 0.2))
+    for width in (0.0, -0.1, math.nan):
+        with pytest.raises(UsageError, match="width"):
+            Region(reach, width=width)
+    with pytest.raises(UsageError, match="radians"):
+        plan_starts(region, 3, yaw=math.inf)

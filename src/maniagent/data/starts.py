@@ -58,7 +58,10 @@ class Start:
 
 @dataclass(frozen=True)
 class Region:
-    """The places at which an object may begin: it can be picked, it is seen, it is clear of what must stay free."""
+    """The places at which an object may begin: it can be picked, it is seen, it is clear of what must stay free.
+
+    Raises UsageError for bounds the wrong way round and for a width that is none.
+    """
 
     reach: Reach
     workspace: Workspace = field(default_factory=Workspace)
@@ -75,6 +78,8 @@ class Region:
         for name, given in (("x", self.x), ("y", self.y)):
             if given is not None and not given[0] <= given[1]:
                 raise UsageError(f"The region's {name} is {given[0]:g} to {given[1]:g} m: give the smaller one first.")
+        if self.width is not None and not self.width > 0:
+            raise UsageError(f"An object {self.width:g} m wide is none: give its width in metres, more than 0.")
 
     @property
     def bounds(self) -> FloatArray:
@@ -120,6 +125,8 @@ def plan_starts(
     """
     if count < 1 or seed < 0:
         raise UsageError(f"A plan needs 1 start or more and a seed of 0 or more, not {count} and {seed}.")
+    if yaw is not None and not np.isfinite(yaw):
+        raise UsageError(f"The yaw is {yaw}; it should be an angle in radians.")
     if np.any(region.bounds[0] > region.bounds[1]):
         raise UsageError(_nowhere(region))
     if pattern in (Pattern.GRID, Pattern.SHUFFLED_GRID):
