@@ -205,6 +205,20 @@ class TabletopEnv(gym.Env[dict[str, Any], NDArray[np.float64]]):
         """Simulate with the targets as they are: time for things to come to rest."""
         mujoco.mj_step(self.model, self.data, round(seconds / self.model.opt.timestep))
 
+    def put(self, name: str, xy: Sequence[float], yaw: float) -> None:
+        """Set an object down at a place of the table (m, rad, base frame), upright, as a person does between episodes.
+
+        Raises UsageError for an object that isn't in the scene.
+        """
+        if name not in self._objects:
+            raise UsageError(f"The scene has no {name}; it has {', '.join(self._objects)}.")
+        joint = self.data.joint(_body(name))
+        height = self._objects[name].rest_z + 0.001
+        joint.qpos[:] = [xy[0], xy[1], height, np.cos(yaw / 2), 0.0, 0.0, np.sin(yaw / 2)]
+        joint.qvel[:] = 0.0
+        mujoco.mj_forward(self.model, self.data)
+        self.settle(SETTLE_SECONDS)
+
     def robot_state(self) -> RobotState:
         """What the encoders say."""
         tcp = self.data.site("tcp")

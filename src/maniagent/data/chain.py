@@ -1,0 +1,116 @@
+"""The chain of one demonstration: bring the object to its start, carry out the task, measure, label.
+
+The same robot does both, so that no hand touches the scene (ManiAgent, section on automatic data collection).
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from dataclasses import dataclass
+
+from ..agents.events import EventLog
+from ..agents.loop import AgentLoop, Budget
+from ..errors import CameraFailure, FailureStage, ManiAgentError, StageFailure
+from ..robots.sampling import RecordableRobot, Sampling
+from ..types import RunResult, RunVerdict
+from .episode import Label, Recording
+from .moves import Move, agents_for, move_to
+from .outcome import THRESHOLD, Outcomes
+from .recording import EpisodeRecorder
+from .starts import Start
+
+DOUBT = 0.005
+"""m either side of the threshold within which perception doesn't decide."""
+
+
+class Stuck(ManiAgentError):
+    """The robot can't go on by itself: a person has to put the object back."""
+
+
+@dataclass(frozen=True)
+class Attempt:
+    """What came of carrying out the task once."""
+
+    label: Label
+    reason: str
+    distance: float | None
+    """m from its place, the farthest of the objects that were moved; None where one isn't seen."""
+    recording: Recording | None
+    """None where nothing could be recorded."""
+
+
+@dataclass(frozen=True)
+class ChainSettings:
+    """How patient the chain is."""
+
+    threshold: float = THRESHOLD
+    """m"""
+    bring_attempts: int = 3
+    """At bringing the object to one start."""
+
+
+class Chain:
+    """Works on one robot, for one task."""
+
+    def __init__(
+        self,
+        robot: RecordableRobot,
+        moves: Sequence[Move],
+        sampling: Sampling,
+        settings: ChainSettings = ChainSettings(),
+    ) -> None:
+        self._robot, self._moves, self._settings = robot, tuple(moves), settings
+        self._outcomes = Outcomes(settings.threshold)
+        self._recorder = EpisodeRecorder(robot, sampling)
+        self._log = EventLog([self._outcomes, self._recorder])
+
+    @property
+    def moved(self) -> str:
+        """What the object is called that the task moves first, and that is brought back."""
+        return self._moves[0].objects[0]
+
+    def bring(self, start: Start) -> str:
+        """Put the object at a start; returns why that start can't be had, empty where the object is there.
+
+        Raises Stuck where the robot can't get hold of the object at all, wherever it was to go.
+        """
+        result = self._run((move_to(self.moved, start.xy, start.yaw),), self._settings.bring_attempts)
+        if result.verdict is RunVerdict.ACHIEVED:
+            return ""
+        last = result.subtasks[-1] if result.subtasks else None
+        if last is not None and last.outcome.stage == FailureStage.PLANNING and last.objects:
+            return result.reason
+        raise Stuck(f"The {self.moved} can't be brought to its next start: {result.reason}")
+
+    def perform(self, seed: int) -> Attempt:
+        """Carry out the task once, recorded; `seed` draws the noise of the recorded pictures."""
+        self._recorder.begin(seed=seed)
+        try:
+            result = self._run(self._moves, attempts=1)
+        except BaseException:
+            self._recorder.cancel()
+            raise
+        try:
+            recording = self._recorder.finish()
+        except CameraFailure as failure:
+            return Attempt("failed", str(failure), None, None)
+        except StageFailure:
+            return Attempt("failed", result.reason, None, None)
+        return self._labelled(result, recording)
+
+    def _labelled(self, result: RunResult, recording: Recording) -> Attempt:
+        achieved = result.verdict is RunVerdict.ACHIEVED
+        distances = self._outcomes.distances
+        distance = None if None in distances or not distances else max(d for d in distances if d is not None)
+        near = distance is not None and abs(distance - self._settings.threshold) <= DOUBT
+        unseen = bool(distances) and distances[-1] is None and result.subtasks[-1].outcome.completed
+        if near or unseen:
+            why = "it lies so near the threshold that the look doesn't decide" if near else "it isn't seen any more"
+            return Attempt("doubtful", f"The arm made every movement, but {why}.", distance, recording)
+        return Attempt("valid" if achieved else "failed", "" if achieved else result.reason, distance, recording)
+
+    def _run(self, moves: Sequence[Move], attempts: int) -> RunResult:
+        self._outcomes.begin()
+        agents = agents_for(self._robot.rig, moves, self._outcomes, attempts)
+        budget = Budget(turns=len(moves) * attempts + 1)
+        return AgentLoop(self._robot, agents, self._log, budget).run(", then ".join(move.text for move in moves))

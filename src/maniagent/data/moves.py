@@ -1,0 +1,150 @@
+"""Movements that are known beforehand: a task's sub-tasks with their sequences, and the way back to a start.
+
+What was reasoned and written once, by a model or by the rules, is bound to every scene anew without asking anyone
+(ManiAgent, section on automatic data collection). The four roles stay: the eyes look, the motion gate decides.
+"""
+
+from __future__ import annotations
+
+from collections.abc import Sequence
+from typing import Annotated
+
+from pydantic import BaseModel, ConfigDict, Field
+
+from ..agents.cache import ActionCache
+from ..agents.memory import Memory
+from ..agents.protocols import Agents
+from ..agents.rules import rules_agents
+from ..agents.rules.controller import RulesControllerAgent
+from ..agents.rules.language import parse_instruction
+from ..perception.rig import Rig
+from ..types import (
+    ActionSequence,
+    ActionStep,
+    Gripper,
+    HereAnchor,
+    ObjectAnchor,
+    ObjectInfo,
+    Orientation,
+    Part,
+    PointAnchor,
+    SceneDescription,
+    Subtask,
+    SubtaskRecord,
+    Verdict,
+)
+from .outcome import Outcomes
+
+HOVER, SETTLE = 0.10, 0.006
+"""m above a place: on the way, and where things are let go."""
+
+
+class Move(BaseModel):
+    """One sub-task whose sequence is known."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    text: Annotated[str, Field(min_length=1, max_length=500)]
+    objects: Annotated[tuple[str, ...], Field(min_length=1, max_length=64)]
+    sequence: ActionSequence
+
+
+def moves_of(instruction: str, cache: ActionCache | None = None) -> tuple[Move, ...]:
+    """The moves of an imperative instruction: out of the cache where it has them, else as the rules write them.
+
+    Raises ReasoningFailure for what the rules don't understand.
+    """
+    controller = RulesControllerAgent()
+    moves = []
+    for command in parse_instruction(instruction):
+        objects = (command.object,) if command.target is None else (command.object, command.target)
+        subtask = Subtask(previous=Verdict.INITIAL, reason="", text=str(command), objects=objects)
+        hit = cache.find(subtask) if cache is not None else None
+        sequence = controller.write(subtask, ()) if hit is None else hit.sequence
+        moves.append(Move(text=subtask.text, objects=objects, sequence=sequence))
+    return tuple(moves)
+
+
+def move_to(name: str, xy: Sequence[float], yaw: float | None = None) -> Move:
+    """Put object `name` at `xy` (m, base frame); its long side along `yaw` (rad, base frame) where that is given."""
+    x, y = float(xy[0]), float(xy[1])
+    place = PointAnchor(x=x, y=y)
+    lie = Orientation() if yaw is None else Orientation(kind="align", yaw=float(yaw), frame="base")
+    grasp, as_grasp = ObjectAnchor(index=0, part=Part.GRASP), Orientation(kind="grasp", index=0)
+    steps = (
+        ActionStep(
+            description=f"Go above the {name}, fingers open",
+            anchor=grasp,
+            offset=(0.0, 0.0, HOVER),
+            orientation=as_grasp,
+            gripper=Gripper.OPEN,
+        ),
+        ActionStep(
+            description=f"Go down and take the {name}", anchor=grasp, orientation=as_grasp, gripper=Gripper.CLOSE
+        ),
+        ActionStep(description="Lift it", anchor=HereAnchor(here=True), offset=(0.0, 0.0, HOVER)),
+        ActionStep(
+            description=f"Carry it to ({x:.2f}, {y:.2f})",
+            anchor=place,
+            offset=(0.0, 0.0, HOVER),
+            carrying=0,
+            orientation=lie,
+        ),
+        ActionStep(
+            description="Lower it and let go",
+            anchor=place,
+            offset=(0.0, 0.0, SETTLE),
+            carrying=0,
+            gripper=Gripper.OPEN,
+        ),
+        ActionStep(description="Come up", anchor=HereAnchor(here=True), offset=(0.0, 0.0, HOVER)),
+    )
+    sequence = ActionSequence(skill="pick-and-place", steps=steps)
+    return Move(text=f"put the {name} at ({x:.3f}, {y:.3f})", objects=(name,), sequence=sequence)
+
+
+def agents_for(rig: Rig, moves: Sequence[Move], outcomes: Outcomes, attempts: int) -> Agents:
+    """The four roles that carry out `moves` one after the other, each at most `attempts` times."""
+    rules = rules_agents(rig)
+    return Agents(
+        name="known moves",
+        scene=rules.scene,
+        reasoning=_InTurn(moves, outcomes, attempts),
+        objects=rules.objects,
+        controller=_Written(moves),
+    )
+
+
+class _InTurn:
+    """A ReasoningAgent that goes through the moves; a move is done when what it moved lies where it was let go."""
+
+    def __init__(self, moves: Sequence[Move], outcomes: Outcomes, attempts: int) -> None:
+        self._moves, self._outcomes, self._attempts = moves, outcomes, attempts
+
+    def next_subtask(self, instruction: str, scene: SceneDescription, memory: Memory) -> Subtask:
+        """The next move, or the same again; cannot once it failed too often."""
+        done = sum(record.verdict is Verdict.SUCCESS for record in memory)
+        verdict, evidence = Verdict.INITIAL, "The first move."
+        if memory.last is not None:
+            verdict, evidence = self._outcomes.judge(memory.last, scene.objects)
+            done += verdict is Verdict.SUCCESS
+        if done == len(self._moves):
+            return Subtask(previous=verdict, reason=evidence, done=True)
+        move = self._moves[done]
+        if verdict is Verdict.FAILURE and len(memory.attempts(move.text)) >= self._attempts:
+            return Subtask(previous=verdict, reason=evidence, cannot=True)
+        return Subtask(previous=verdict, reason=evidence, text=move.text, objects=move.objects)
+
+
+class _Written:
+    """A ControllerAgent that has every sequence already."""
+
+    def __init__(self, moves: Sequence[Move]) -> None:
+        self._sequences = {move.text: move.sequence for move in moves}
+
+    def write(self, subtask: Subtask, objects: Sequence[ObjectInfo], feedback: str = "") -> ActionSequence:
+        """The sequence, the same again where it was refused: the loop then gives the attempt up."""
+        return self._sequences[subtask.text]
+
+    def learn(self, record: SubtaskRecord) -> None:
+        """Nothing is learnt while collecting."""

@@ -1,0 +1,95 @@
+"""What a collection is told to do, and the folder that holds it.
+
+collect.json         CollectSettings: the same command goes on from there
+attempts-wNN.jsonl   one EpisodeInfo a line: every attempt of worker NN, whatever came of it
+plan-wNN.json        what worker NN keeps free on its table
+episodes/            staged episodes (staging.py), until they are in the dataset; quarantine/ within
+dataset/             the LeRobotDataset v3
+coverage.png, summary.json, summary.md
+"""
+
+from __future__ import annotations
+
+from pathlib import Path
+from typing import Annotated, Literal, Self
+
+from pydantic import BaseModel, ConfigDict, Field, ValidationError
+
+from ..errors import UsageError
+from ..robots.sampling import Sampling
+from .moves import Move
+from .outcome import THRESHOLD
+from .starts import Pattern
+
+SETTINGS = "collect.json"
+Reset = Literal["robot", "teleport"]
+Span = tuple[float, float]
+
+
+class CollectSettings(BaseModel):
+    """All that decides what is collected: the same settings give the same episodes."""
+
+    model_config = ConfigDict(frozen=True, extra="forbid")
+
+    task: str
+    """A task's name, or the path of a scene file."""
+    instruction: str
+    """What the episodes are labelled with."""
+    paraphrases: tuple[str, ...] = ()
+    moves: Annotated[tuple[Move, ...], Field(min_length=1)]
+    """How the task is carried out; the first object of the first one is brought back each time."""
+    count: Annotated[int, Field(ge=1)]
+    """Valid episodes wanted. It may be raised when a collection goes on."""
+    seed: Annotated[int, Field(ge=0)] = 0
+    workers: Annotated[int, Field(ge=1, le=256)] = 1
+    pattern: Pattern = Pattern.SOBOL
+    yaw: float | None = None
+    """rad; None varies it."""
+    x: Span | None = None
+    y: Span | None = None
+    """m: bounds on where objects start; None for the whole reachable table."""
+    reset: Reset = "robot"
+    sampling: Sampling = Sampling()
+    threshold: Annotated[float, Field(gt=0, le=0.2)] = THRESHOLD
+    """m"""
+    attempts: Annotated[int, Field(ge=1, le=10)] = 2
+    """At one start, each of which begins with bringing the object there."""
+
+    def quota(self, worker: int) -> int:
+        """How many valid episodes a worker collects."""
+        return self.count // self.workers + (worker < self.count % self.workers)
+
+    def save(self, folder: Path) -> None:
+        """Write them down, or compare with those that are there: a folder holds one collection.
+
+        Raises UsageError where the folder holds another one, or something else.
+        """
+        path = folder / SETTINGS
+        if path.exists():
+            self._compare(type(self).load(folder), folder)
+        elif folder.exists() and any(folder.iterdir()):
+            raise UsageError(f"{folder} holds something that is no collection; name another folder.")
+        folder.mkdir(parents=True, exist_ok=True)
+        draft = path.with_suffix(".tmp")
+        draft.write_text(self.model_dump_json(indent=2) + "\n", encoding="utf-8")
+        draft.replace(path)
+
+    @classmethod
+    def load(cls, folder: Path) -> Self:
+        """The settings of a collection; UsageError where the folder holds none that can be read."""
+        try:
+            return cls.model_validate_json((folder / SETTINGS).read_text(encoding="utf-8"))
+        except FileNotFoundError:
+            raise UsageError(f"{folder} is no collection: it has no {SETTINGS}.") from None
+        except (OSError, ValidationError) as error:
+            raise UsageError(f"{folder / SETTINGS} can't be read: {error}.") from error
+
+    def _compare(self, there: Self, folder: Path) -> None:
+        mine, theirs = self.model_dump(), there.model_dump()
+        other = [name for name in mine if name != "count" and mine[name] != theirs[name]]
+        if other:
+            said = ", ".join(f"{name} {theirs[name]!r}, not {mine[name]!r}" for name in other if name != "moves")
+            raise UsageError(
+                f"{folder} holds a collection with other settings ({said or 'other moves'}). Name another folder, or "
+                "give the same settings; only the number of episodes may be changed."
+            )
