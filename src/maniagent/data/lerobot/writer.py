@@ -78,6 +78,18 @@ def _check_videos(data: Any, length: int, folder: Path) -> None:
             raise RuntimeError(f"{folder}: {key} has {seconds * data.fps:.1f} frames on video, not {length}")
 
 
+def _mend_statistics() -> None:
+    """Have lerobot sum up images in floating point.
+
+    lerobot 0.4.4 squares 8-bit images in 8 bits: every standard deviation comes out as 0, and a policy that is
+    normalised by it (all but those that use ImageNet's) sees images a hundred times too bright.
+    """
+    from lerobot.datasets.compute_stats import RunningQuantileStats
+
+    update = RunningQuantileStats.update
+    RunningQuantileStats.update = lambda self, batch: update(self, np.asarray(batch, np.float64))
+
+
 def read_columns(folder: Path) -> dict[str, Array]:
     """The features of a staged episode by name, each with T rows (data/episode.py says how an episode lies on disk)."""
     with np.load(folder / "steps.npz", allow_pickle=False) as steps:
@@ -169,6 +181,7 @@ def main() -> None:
         answers.write(json.dumps(what) + "\n")
         answers.flush()
 
+    _mend_statistics()
     say({"ok": {"lerobot": lerobot.__version__}})
     requests: queue.SimpleQueue[str] = queue.SimpleQueue()
     threading.Thread(target=_read_requests, args=(requests,), daemon=True).start()
