@@ -1,5 +1,6 @@
 """Every fault that can be planted in a dataset is found, by the check that names it; nothing else is."""
 
+import io
 import json
 import shutil
 from collections.abc import Callable
@@ -11,7 +12,20 @@ import pyarrow as pa
 import pytest
 from hypothesis import HealthCheck, given, settings
 from hypothesis import strategies as st
-from made_dataset import CAMERA, DATA, EPISODES, LENGTHS, TASKS, VIDEO, edit_column, edit_json, edit_table, made_dataset
+from made_dataset import (
+    CAMERA,
+    DATA,
+    EPISODES,
+    LENGTHS,
+    TASKS,
+    VIDEO,
+    edit_column,
+    edit_json,
+    edit_table,
+    made_dataset,
+    picture,
+)
+from PIL import Image
 from staged import made_info
 
 from maniagent.data.dataset.findings import Check, Report
@@ -128,6 +142,12 @@ def _cells(path: Path, column: str) -> list[Any]:
     found: list[Any] = []
     edit_column(path, column, found.extend)
     return found
+
+
+def test_frames_that_name_no_subtask_are_a_warning(dataset: Path) -> None:
+    edit_column(dataset / FIRST, "subtask", _set(0, ""))
+    check = named(verify(dataset))["sub-task of each frame"]
+    assert [(f.where, f.what) for f in check.findings] == [("episode 0, frame 0", "1 of 12 frames name no sub-task")]
 
 
 @pytest.mark.parametrize("shape", [[6], [8], [7, 1]])
@@ -280,6 +300,24 @@ def test_a_dataset_without_videos_is_verified_too(dataset: Path) -> None:
     report = verify(dataset)
     assert report.sound
     assert named(report)["video frames"].outcome == "skipped"
+
+
+@pytest.mark.parametrize("deep", [False, True])
+def test_pictures_in_the_data_files_are_looked_at_too(dataset: Path, deep: bool) -> None:
+    shutil.rmtree(dataset / "videos")
+    edit_json(dataset / "meta/info.json", lambda info: info["features"][CAMERA].update(dtype="image"))
+    for file, start, stop in ((FIRST, 0, 2), (SECOND, 2, 4)):
+        cells = [_cell(e, t) for e in range(start, stop) for t in range(LENGTHS[e])]
+        edit_table(dataset / file, lambda table, cells=cells: table.append_column(CAMERA, pa.array(cells)))
+    assert failed(verify(dataset, deep=deep)) == set()
+    edit_column(dataset / SECOND, CAMERA, lambda cells: cells[0].update(bytes=b"no picture"))
+    assert failed(verify(dataset, deep=deep)) == {"pictures"}
+
+
+def _cell(episode: int, frame: int) -> dict[str, Any]:
+    buffer = io.BytesIO()
+    Image.fromarray(picture(episode, frame)).save(buffer, "PNG")
+    return {"bytes": buffer.getvalue(), "path": f"frame-{frame:06d}.png"}
 
 
 # What can't be read -----------------------------------------------------------------------------------------------

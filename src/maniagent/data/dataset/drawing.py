@@ -15,7 +15,7 @@ Box = tuple[float, float, float, float]
 PAPER: Colour = (255, 255, 255)
 INK: Colour = (24, 28, 36)
 QUIET: Colour = (110, 118, 132)
-GRID: Colour = (226, 229, 235)
+GRID: Colour = (203, 208, 217)
 
 LINES: tuple[Colour, ...] = (
     (37, 99, 235),

@@ -38,7 +38,7 @@ def contact_sheet(dataset: Dataset, camera: str, episodes: Sequence[Episode], mo
     row_height = _HEAD + tall + _FOOT
     columns = max((len(row.pictures) for row in rows), default=1)
     canvas = Canvas(2 * _MARGIN + columns * (_WIDTH + _GAP) - _GAP, _TITLE + len(rows) * row_height + _MARGIN // 2)
-    name = dataset.root.resolve().name
+    name = "/".join(dataset.root.resolve().parts[-2:])
     canvas.text(_MARGIN, 16, plain(f"{name}  ·  {camera}"), 18)
     about = f"{len(dataset.episodes)} episodes, {dataset.info.total_frames} frames at {dataset.info.fps:g} a second"
     canvas.text(_MARGIN, 38, about, 12, QUIET)
@@ -63,7 +63,7 @@ def _draw_row(canvas: Canvas, row: _Row, fps: float, top: float, tall: int) -> N
     canvas.text(x, top + 8, task, 14, QUIET)
     length = f"{row.episode.length} frames, {row.episode.length / fps:.1f} s"
     canvas.text(_MARGIN + len(row.pictures) * (_WIDTH + _GAP) - _GAP, top + 10, length, 12, QUIET, "ra")
-    tints = {text: TINTS[i % len(TINTS)] for i, text in enumerate(dict.fromkeys(row.subtasks))}
+    tints = {text: TINTS[i % len(TINTS)] for i, text in enumerate(dict.fromkeys(filter(None, row.subtasks)))}
     for column, (frame, picture) in enumerate(zip(row.frames, row.pictures, strict=True)):
         left = _MARGIN + column * (_WIDTH + _GAP)
         canvas.picture(left, top + _HEAD, Image.fromarray(picture), _WIDTH, tall)

@@ -10,13 +10,13 @@ import numpy as np
 from numpy.typing import NDArray
 
 from .checks.overview import check_collected, check_episodes, check_files, check_tasks, check_totals
-from .checks.rows import Duplicates, EpisodeRows, Finite, Indices, Motion, RowCheck, Tasks, Timestamps
+from .checks.rows import Duplicates, EpisodeRows, Finite, Indices, Motion, RowCheck, Subtasks, Tasks, Timestamps
 from .checks.statistics import Statistics
 from .checks.videos import Videos
 from .findings import Check, Report, named
 from .layout import BOOKKEEPING, STATS, DatasetError, Info, load_info, load_json
 from .reading import Episode, check_is_dataset, read_collected, read_episodes, read_tasks
-from .tables import DataFile, parquet_files, type_fits, values
+from .tables import DataFile, parquet_files, texts, type_fits, values
 
 OnProgress = Callable[[int, int, str], None]
 """Told how many of how many steps are done, and what is looked at."""
@@ -80,7 +80,8 @@ class _Rows:
         self._belonging = Check("rows", "Has every episode its rows, in one piece, and every row an episode?")
         statistics = Statistics(info, stored)
         self._asked: tuple[RowCheck, ...] = (
-            Indices(), Timestamps(info), Finite(), Motion(info), Tasks(tasks), Duplicates(info), statistics,
+            Indices(), Timestamps(info), Finite(), Motion(info), Tasks(tasks), Subtasks(info),
+            Duplicates(info), statistics,
         )  # fmt: skip
         asked = (one.check for one in self._asked)
         self.checks = (self._schema, self._belonging, self._shapes, *asked, statistics.by_episode)
@@ -124,9 +125,10 @@ class _Rows:
         for episode in expected:
             rows = np.flatnonzero(belongs == episode.index)
             if self._in_one_piece(file, episode, rows):
-                columns = self._columns(file, episode, int(rows[0]), int(rows[-1]) + 1)
+                start, stop = int(rows[0]), int(rows[-1]) + 1
+                columns, subtasks = self._columns(file, episode, start, stop), self._subtasks(file, start, stop)
                 for one in self._asked:
-                    one.visit(EpisodeRows(episode, position + int(rows[0]), columns))
+                    one.visit(EpisodeRows(episode, position + start, columns, subtasks))
             progress(1, file.where)
 
     def _in_one_piece(self, file: DataFile, episode: Episode, rows: NDArray[np.intp]) -> bool:
@@ -153,6 +155,13 @@ class _Rows:
             elif feature.name in BOOKKEEPING or feature.is_vector:
                 self._shapes.problem(f"{file.where}, {episode.name}", f"{feature.name} holds no numbers")
         return columns
+
+    def _subtasks(self, file: DataFile, start: int, stop: int) -> tuple[str, ...]:
+        """The texts of the rows; none where they are missing or no texts, which the schema's check says."""
+        feature = self._info.features.get("subtask")
+        if feature is None or "subtask" not in file.columns or not type_fits(feature, file.columns["subtask"]):
+            return ()
+        return texts(file.table(start, stop, ("subtask",))["subtask"])
 
 
 def _read_statistics(root: Path, check: Check) -> Mapping[str, Any] | None:

@@ -35,6 +35,8 @@ class EpisodeRows:
     """Of its first row over all data files in order, by which LeRobot looks rows up."""
     columns: Mapping[str, NDArray[Any]]
     """(T, *shape) by feature; those that could be read."""
+    subtasks: tuple[str, ...] = ()
+    """A text a frame; none where the dataset has no such feature."""
 
 
 class RowCheck(Protocol):
@@ -191,6 +193,25 @@ class Tasks:
             self.check.problem(
                 rows.episode.name, f"its frames say {texts}, its tasks are {named(map(repr, rows.episode.tasks), 3)}"
             )
+
+    def finish(self) -> None:
+        """Nothing is left to do."""
+
+
+class Subtasks:
+    """Frames say what the robot was doing, where the dataset promises that they do."""
+
+    def __init__(self, info: Info) -> None:
+        self.check = Check("sub-task of each frame", "Do frames say what the robot was doing?")
+        if "subtask" not in info.features:
+            self.check.skipped = "the dataset has no feature subtask"
+
+    def visit(self, rows: EpisodeRows) -> None:
+        """Look at one episode."""
+        silent = [frame for frame, text in enumerate(rows.subtasks) if not text.strip()]
+        if silent:
+            what = f"{len(silent)} of {len(rows.subtasks)} frames name no sub-task"
+            self.check.warning(f"{rows.episode.name}, frame {silent[0]}", what)
 
     def finish(self) -> None:
         """Nothing is left to do."""

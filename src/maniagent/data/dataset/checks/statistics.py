@@ -16,7 +16,7 @@ from .rows import EpisodeRows
 
 _RELATIVE = 1e-4
 """Of a feature's scale (its square for variances): LeRobot computes in float32."""
-_OVERFLOW = "LeRobot 0.4.4 squares uint8. Compute the statistics anew, or train with ImageNet's, its default."
+_OVERFLOW = "LeRobot issue 3682: compute the statistics anew, or train with ImageNet's, LeRobot's default."
 _ANEW = "Compute the statistics anew; training normalises by them."
 
 

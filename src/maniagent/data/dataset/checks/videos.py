@@ -11,7 +11,7 @@ import numpy as np
 from ....geometry import FloatArray
 from ..findings import Check
 from ..layout import DatasetError, Feature, Info, inside
-from ..reading import Clip, Episode
+from ..reading import Clip, Dataset, Episode
 from ..video import TOLERANCE, Picture, Stream, all_pictures, pictures_at, probe
 
 SAMPLE = 20
@@ -26,7 +26,7 @@ class Videos:
     """Goes through the video files of all cameras, one after the other."""
 
     def __init__(self, root: Path, info: Info, episodes: tuple[Episode, ...], deep: bool) -> None:
-        self._root, self._info, self._deep = root, info, deep
+        self._root, self._info, self._episodes, self._deep = root, info, episodes, deep
         self._sampled = {episodes[i].index for i in _spread(len(episodes), SAMPLE)}
         self.files: dict[str, list[Episode]] = defaultdict(list)
         for camera in info.cameras:
@@ -36,8 +36,11 @@ class Videos:
         self.frames = Check("video frames", "Has every frame a picture of its size, at its time?")
         how = "all are decoded" if deep else f"the first and last of up to {SAMPLE} episodes are decoded; --deep: all"
         self.pictures = Check("pictures", f"Do the pictures decode and show something? ({how})")
+        self._in_tables = [name for name in info.pictures if name not in info.cameras]
         if not info.cameras:
-            self.frames.skipped = self.pictures.skipped = "there are no videos"
+            self.frames.skipped = "there are no videos"
+        if not info.pictures:
+            self.pictures.skipped = "there are no pictures"
 
     def run(self, advance: Advance) -> None:
         """Ask; `advance` is told of the episodes that are done."""
@@ -54,6 +57,22 @@ class Videos:
             except DatasetError as error:
                 self.frames.broken(error)
             advance(len(episodes), file)
+        for camera in self._in_tables:
+            self._decode_from_tables(camera)
+
+    def _decode_from_tables(self, camera: str) -> None:
+        """Pictures that lie in the data files themselves, one by one."""
+        dataset = Dataset(self._root, self._info, {}, self._episodes)
+        for episode in self._episodes:
+            if episode.length < 1 or not (self._deep or episode.index in self._sampled):
+                continue
+            frames = range(episode.length) if self._deep else sorted({0, episode.length - 1})
+            try:
+                pictures = dataset.pictures(episode, camera, frames)
+            except DatasetError as error:
+                self.pictures.broken(error)
+                continue
+            self._judge(f"{camera}, {episode.name}", list(zip(frames, pictures, strict=True)), episode.length)
 
     def _count(self, camera: str, file: str, stream: Stream, episodes: list[Episode]) -> None:
         height, width = _size(self._info.features[camera])
@@ -135,7 +154,7 @@ class Videos:
 
     def _judge(self, where: str, pictures: list[tuple[int, Picture]], length: int) -> None:
         self._tell_dark(where, [frame for frame, picture in pictures if picture.mean() < _DARK], length)
-        if length > 1 and np.array_equal(pictures[0][1], pictures[-1][1]):
+        if length > 1 and all(np.array_equal(pictures[0][1], picture) for _, picture in pictures[1:]):
             self._tell_still(where)
 
     def _tell_dark(self, where: str, frames: list[int], length: int) -> None:
