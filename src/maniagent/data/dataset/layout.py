@@ -199,6 +199,7 @@ def _template(raw: Any, key: str, fields: set[str]) -> str:
     found = {match[1] for match in _FIELD.finditer(raw)} if isinstance(raw, str) else set()
     if found != fields or re.search(r"[{}]", _FIELD.sub("", raw)):
         raise DatasetError(INFO, f"{key} is {raw!r}, a path with {', '.join(sorted(fields))} is wanted")
+    inside(Path(), str(raw), INFO)
     return str(raw)
 
 

@@ -63,8 +63,8 @@ class Statistics:
     doesn't keep theirs when it merges datasets. So are quantiles, which it only estimates.
     """
 
-    def __init__(self, info: Info, stored: Mapping[str, Any] | None) -> None:
-        self._info, self._stored = info, stored
+    def __init__(self, info: Info, stored: Mapping[str, Any] | None, frames: int) -> None:
+        self._info, self._stored, self._frames = info, stored, frames
         self._features = [f for f in info.stored if f.is_vector and f.name not in BOOKKEEPING]
         self.moments: dict[str, Moments] = {}
         self._without: list[int] = []
@@ -100,17 +100,25 @@ class Statistics:
             what = f"{name}: std is 0 in episodes {named(numbers)}, though the pictures vary"
             self.by_episode.warning(STATS, what, _OVERFLOW)
         if self._stored is None:
+            self.check.skipped = f"{STATS} can't be read"
             return
         for feature in self._info.features.values():
             stored = self._stored.get(feature.name)
-            if not isinstance(stored, Mapping):
-                if feature.dtype != "string":
-                    self.check.problem(STATS, f"has nothing of {feature.name}", _ANEW)
-            elif feature.name in self.moments:
-                for what in differences(self.moments[feature.name], stored):
-                    self.check.problem(STATS, f"{feature.name}: {what}", _ANEW)
-            elif feature.is_picture:
-                self._picture(feature, stored)
+            if isinstance(stored, Mapping):
+                self._compare(feature, stored)
+            elif feature.dtype != "string":
+                self.check.problem(STATS, f"has nothing of {feature.name}", _ANEW)
+
+    def _compare(self, feature: Feature, stored: Mapping[str, Any]) -> None:
+        if feature.is_picture:
+            self._picture(feature, stored)
+        elif feature in self._features:
+            found = self.moments.get(feature.name)
+            if found is None or found.count != self._frames:
+                self.check.skipped = "not all numbers can be read"
+                return
+            for what in differences(found, stored):
+                self.check.problem(STATS, f"{feature.name}: {what}", _ANEW)
 
     def _picture(self, feature: Feature, stored: Mapping[str, Any]) -> None:
         """Pictures' statistics are of samples, so they are only asked whether they can be true."""
