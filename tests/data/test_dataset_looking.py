@@ -1,7 +1,10 @@
 """Reading a dataset, summing it up, drawing it, and the commands that do so."""
 
+import io
 import json
 import shutil
+import subprocess
+import sys
 from pathlib import Path
 
 import numpy as np
@@ -23,6 +26,7 @@ from made_dataset import (
     picture,
 )
 from PIL import Image
+from rich.console import Console
 from staged import made_info
 from typer.testing import CliRunner, Result
 
@@ -31,6 +35,7 @@ from maniagent.data.dataset.checks.statistics import Moments
 from maniagent.data.dataset.curves import curves
 from maniagent.data.dataset.drawing import fitted, ticks, width_of, wrapped
 from maniagent.data.dataset.layout import DatasetError
+from maniagent.data.dataset.progress import VerifyProgress
 from maniagent.data.dataset.reading import Dataset
 from maniagent.data.dataset.summary import judge, summarise
 from maniagent.data.dataset.view import view
@@ -215,6 +220,22 @@ def test_stats_prints_tables_or_json(made: Path) -> None:
 def test_what_a_dataset_says_cant_command_the_terminal(copy: Path) -> None:
     edit_json(copy / "meta/info.json", lambda info: info.update(robot_type="\x1b[2Jrobot"))
     assert "\x1b" not in call("stats", copy).stdout
+
+
+def test_progress_shows_what_is_looked_at_and_nothing_that_commands_the_terminal() -> None:
+    shown = io.StringIO()
+    with VerifyProgress(Console(file=shown, force_terminal=True, width=100)) as progress:
+        progress(3, 8, "data/\x1b[2Jfile.parquet")
+    assert "3/8" in shown.getvalue()
+    assert "data/ [2Jfile.parquet" in shown.getvalue()
+
+
+def test_without_pyarrow_it_says_what_to_install(made: Path) -> None:
+    script = "import sys; sys.modules['pyarrow'] = None; from maniagent.cli import main; main()"
+    command = [sys.executable, "-c", script, "data", "stats", str(made)]
+    done = subprocess.run(command, capture_output=True, text=True, timeout=60, check=False)
+    assert done.returncode == 2
+    assert "pip install 'maniagent[data]'" in done.stderr
 
 
 def test_view_names_what_it_wrote(made: Path, tmp_path: Path) -> None:

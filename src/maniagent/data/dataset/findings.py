@@ -95,7 +95,7 @@ class Report:
 
     @property
     def sound(self) -> bool:
-        """Whether nothing is wrong and nothing was left unasked for a fault's sake."""
+        """Whether nothing is wrong."""
         return self.problems == 0
 
     def to_plain(self) -> dict[str, Any]:

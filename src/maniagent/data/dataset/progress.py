@@ -7,7 +7,8 @@ from typing import Self
 
 from rich.console import Console
 from rich.progress import BarColumn, MofNCompleteColumn, Progress, TextColumn, TimeRemainingColumn
-from rich.text import Text
+
+from .drawing import plain
 
 
 class VerifyProgress:
@@ -37,4 +38,4 @@ class VerifyProgress:
 
     def __call__(self, done: int, total: int, what: str) -> None:
         """Show that `done` of `total` steps are done."""
-        self._bar.update(self._id, completed=done, total=total, description=Text(what).plain[-60:])
+        self._bar.update(self._id, completed=done, total=total, description=plain(what)[-60:])
