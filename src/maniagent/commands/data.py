@@ -1,4 +1,4 @@
-"""`maniagent data`: look at a LeRobot dataset, ours or anybody's."""
+"""`maniagent data`: look at a LeRobot dataset, ours or anybody's; what makes datasets is in datasets.py."""
 
 from __future__ import annotations
 
@@ -10,12 +10,15 @@ import typer
 
 from .cache import printable
 from .common import ACHIEVED, NOT_ACHIEVED, Json, errors_told
+from .datasets import merge, publish, split
 
 if TYPE_CHECKING:
     from ..data.dataset.findings import Check, Report
     from ..data.dataset.summary import DatasetSummary
 
-app = typer.Typer(no_args_is_help=True, help="Look at a LeRobotDataset v3, ours or anybody's (docs/data.md).")
+app = typer.Typer(
+    no_args_is_help=True, help="Look at LeRobot datasets (v3), ours or anybody's, and make them (docs/data.md)."
+)
 
 Folder = Annotated[
     Path, typer.Argument(metavar="DATASET", help="The dataset's folder, which holds meta, data, videos.")
@@ -187,3 +190,7 @@ def _labels(summary: DatasetSummary) -> Iterator[tuple[str, str]]:
     for name, share in (("precision", labels.precision), ("recall", labels.recall)):
         if share is not None:
             yield f"label {name}", f"{100 * share:.1f} % by the simulator's truth on {labels.judged} episodes"
+
+
+for _command in (publish, merge, split):
+    app.command()(_command)
