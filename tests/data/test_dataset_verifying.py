@@ -169,9 +169,19 @@ def test_missing_and_surplus_columns_are_told_apart(dataset: Path) -> None:
     assert (check.problems, check.warnings) == (1, 1)
 
 
-def test_empty_cells_are_found(dataset: Path) -> None:
-    edit_column(dataset / FIRST, "action", _set(3, None))
-    assert "shapes" in failed(verify(dataset))
+@pytest.mark.parametrize(("column", "check"), [("action", "shapes"), ("index", "shapes"), ("episode_index", "rows")])
+def test_empty_cells_are_found(dataset: Path, column: str, check: str) -> None:
+    edit_column(dataset / FIRST, column, _set(3, None))
+    assert check in failed(verify(dataset))
+
+
+def test_texts_where_numbers_are_wanted_are_found(dataset: Path) -> None:
+    def edit(table: pa.Table) -> pa.Table:
+        at = table.schema.get_field_index("index")
+        return table.set_column(at, "index", pa.array([str(i) for i in range(len(table))]))
+
+    edit_table(dataset / FIRST, edit)
+    assert {"schema", "shapes"} <= failed(verify(dataset))
 
 
 def test_stale_statistics_are_found_overall_and_by_episode(dataset: Path) -> None:

@@ -85,7 +85,10 @@ class DataFile:
         """A whole column of single numbers."""
         if name not in self.columns:
             raise DatasetError(self.where, f"has no column {name!r}")
-        return values(self.table(0, self.length, (name,))[name], (1,))
+        try:
+            return values(self.table(0, self.length, (name,))[name], (1,))
+        except ValueError as error:
+            raise DatasetError(self.where, f"{name} {error}") from error
 
     def _broken(self, error: Exception) -> DatasetError:
         return DatasetError(self.where, f"can't be read ({_first_line(error)})", _AGAIN)
