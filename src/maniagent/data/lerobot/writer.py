@@ -81,8 +81,8 @@ def _check_videos(data: Any, length: int, folder: Path) -> None:
 def _mend_statistics() -> None:
     """Have lerobot sum up images in floating point.
 
-    lerobot 0.4.4 squares 8-bit images in 8 bits: every standard deviation comes out as 0, and a policy that is
-    normalised by it (all but those that use ImageNet's) sees images a hundred times too bright.
+    lerobot 0.4.4 squares 8-bit images in 8 bits: the standard deviation of each episode comes out as 0, that of the
+    dataset as the spread of their means, and policies that are normalised by it see images far out of scale.
     """
     from lerobot.datasets.compute_stats import RunningQuantileStats
 
