@@ -10,6 +10,7 @@ import typer
 
 from . import __version__
 from .commands import cache, data, models, prompts, simpler
+from .commands.collect import collect
 from .commands.common import ACHIEVED, NOT_ACHIEVED, WRONG_USE, Json, errors_told
 from .commands.crew import (
     ActorOption,
@@ -42,6 +43,7 @@ app.add_typer(models.app, name="models")
 app.add_typer(prompts.app, name="prompts")
 app.add_typer(simpler.app, name="simpler")
 app.command()(replay)
+app.command()(collect)
 
 
 def main() -> None:

@@ -37,6 +37,8 @@ class Attempt:
     """m from its place, the farthest of the objects that were moved; None where one isn't seen."""
     recording: Recording | None
     """None where nothing could be recorded."""
+    began: tuple[float, float] | None = None
+    """m, base frame: where the object that moves first was seen; None where it wasn't."""
 
 
 @dataclass(frozen=True)
@@ -90,24 +92,28 @@ class Chain:
         except BaseException:
             self._recorder.cancel()
             raise
+        objects = result.subtasks[0].objects if result.subtasks else ()
+        began = (float(objects[0].centre[0]), float(objects[0].centre[1])) if objects else None
         try:
             recording = self._recorder.finish()
-        except CameraFailure as failure:
-            return Attempt("failed", str(failure), None, None)
-        except StageFailure:
-            return Attempt("failed", result.reason, None, None)
-        return self._labelled(result, recording)
+        except StageFailure as failure:  # a camera stopped, or nothing moved
+            reason = str(failure) if isinstance(failure, CameraFailure) else result.reason
+            return Attempt("failed", reason, None, None, began)
+        label, reason, distance = self._judge(result)
+        return Attempt(label, reason, distance, recording, began)
 
-    def _labelled(self, result: RunResult, recording: Recording) -> Attempt:
-        achieved = result.verdict is RunVerdict.ACHIEVED
+    def _judge(self, result: RunResult) -> tuple[Label, str, float | None]:
+        """The label, why it isn't valid, and the farthest distance (m) from where things were to be."""
         distances = self._outcomes.distances
-        distance = None if None in distances or not distances else max(d for d in distances if d is not None)
-        near = distance is not None and abs(distance - self._settings.threshold) <= DOUBT
-        unseen = bool(distances) and distances[-1] is None and result.subtasks[-1].outcome.completed
-        if near or unseen:
-            why = "it lies so near the threshold that the look doesn't decide" if near else "it isn't seen any more"
-            return Attempt("doubtful", f"The arm made every movement, but {why}.", distance, recording)
-        return Attempt("valid" if achieved else "failed", "" if achieved else result.reason, distance, recording)
+        seen = [d for d in distances if d is not None]
+        distance = max(seen) if seen and len(seen) == len(distances) else None
+        if distance is not None and abs(distance - self._settings.threshold) <= DOUBT:
+            return "doubtful", "It lies so near the threshold that the look doesn't decide.", distance
+        if distances and distances[-1] is None and result.subtasks[-1].outcome.completed:
+            return "doubtful", "The arm made every movement, but the object isn't seen any more.", None
+        if result.verdict is RunVerdict.ACHIEVED:
+            return "valid", "", distance
+        return "failed", result.reason, distance
 
     def _run(self, moves: Sequence[Move], attempts: int) -> RunResult:
         self._outcomes.begin()

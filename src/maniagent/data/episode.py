@@ -74,6 +74,8 @@ class EpisodeInfo(BaseModel):
     seed: int
     start: tuple[float, float, float]
     """x, y (m), yaw (rad) at which the plan wanted the object to begin."""
+    began: tuple[float, float] | None = None
+    """x, y (m) at which the object was seen to begin; None where it wasn't."""
     attempts: Annotated[int, Field(ge=1)] = 1
     """The attempt at this start that is recorded here."""
     label: Label

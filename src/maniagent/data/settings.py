@@ -11,13 +11,16 @@ coverage.png, summary.json, summary.md
 from __future__ import annotations
 
 from pathlib import Path
-from typing import Annotated, Literal, Self
+from typing import Annotated, Any, Literal, Self
 
 from pydantic import BaseModel, ConfigDict, Field, ValidationError
 
-from ..errors import UsageError
+from ..agents.cache import ActionCache, CacheStore
+from ..envs.scene import describe_validation
+from ..errors import ReasoningFailure, UsageError
 from ..robots.sampling import Sampling
-from .moves import Move
+from ..tasks import task_named
+from .moves import Move, moves_of
 from .outcome import THRESHOLD
 from .starts import Pattern
 
@@ -93,3 +96,25 @@ class CollectSettings(BaseModel):
                 f"{folder} holds a collection with other settings ({said or 'other moves'}). Name another folder, or "
                 "give the same settings; only the number of episodes may be changed."
             )
+
+
+def checked_settings(task: str, do: str | None, cache: Path | None, **said: Any) -> CollectSettings:
+    """Settings for a task by its name or scene file, with the moves that `do`, else its own instruction, takes.
+
+    Raises UsageError for an unknown task, one that draws its instruction anew each time, settings that make no sense,
+    and what takes a language model to carry out.
+    """
+    chosen = task_named(task)
+    if chosen.points:
+        raise UsageError(f"{task} draws the points of its instruction: say one with --do to collect for it.")
+    if not chosen.success:
+        raise UsageError(f"{task} says of no object where it should be; a scene to collect in needs `success`.")
+    store = ActionCache(CacheStore(cache, must_exist=True)) if cache is not None else None
+    try:
+        moves = moves_of(do or chosen.instruction, store)
+    except ReasoningFailure as failure:
+        raise UsageError(f"{failure} Say with --do, in plain commands, what carries it out.") from failure
+    try:
+        return CollectSettings(task=task, instruction=chosen.instruction, moves=moves, **said)
+    except ValidationError as error:
+        raise UsageError(describe_validation(error)) from error

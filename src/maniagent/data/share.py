@@ -92,6 +92,7 @@ class Share:
             attempts=number,
             label=attempt.label,
             reason=attempt.reason[:500],
+            began=attempt.began,
             distance=attempt.distance,
             true_distance=true_distance,
             truly_valid=truly_valid,

@@ -10,7 +10,7 @@ from ..errors import UnknownNameError
 from .conditions import Condition, Truth
 from .task import Episode, Task, load_task
 
-__all__ = ["Condition", "Episode", "Task", "Truth", "get", "load_task", "names"]
+__all__ = ["Condition", "Episode", "Task", "Truth", "get", "load_task", "names", "task_named"]
 
 
 @cache
@@ -31,3 +31,8 @@ def get(name: str) -> Task:
         return _library()[name]
     except KeyError:
         raise UnknownNameError("task", name, _library()) from None
+
+
+def task_named(said: str) -> Task:
+    """A task of the library by its name, or the one in a scene file by its path."""
+    return load_task(Path(said)) if Path(said).suffix in (".yaml", ".yml") else get(said)

@@ -1,0 +1,114 @@
+"""`maniagent collect`: demonstrations without a hand on the scene."""
+
+from __future__ import annotations
+
+import math
+from pathlib import Path
+from typing import TYPE_CHECKING, Annotated
+
+import typer
+
+from .common import Json, errors_told
+
+if TYPE_CHECKING:
+    from ..data.summary import Summary
+
+
+def collect(
+    task: Annotated[str, typer.Argument(help="A task (`maniagent tasks` lists them), or a scene file.")],
+    count: Annotated[int, typer.Option("-n", "--count", min=1, help="Valid episodes wanted.")] = 100,
+    out: Annotated[Path, typer.Option(help="Folder of the collection.")] = Path("runs/collection"),
+    workers: Annotated[int, typer.Option(min=1, max=256, help="Processes, each with a table of its own.")] = 1,
+    seed: Annotated[int, typer.Option(min=0, help="Fixes layouts, starts and the cameras' noise.")] = 0,
+    do: Annotated[
+        str | None, typer.Option(help="What is carried out, as a plain command, if it isn't the instruction itself.")
+    ] = None,
+    say: Annotated[
+        list[str] | None, typer.Option(help="Another way to say the instruction, for the labels; may be repeated.")
+    ] = None,
+    pattern: Annotated[
+        str, typer.Option(help="How starts follow each other: sobol, random, grid, shuffled-grid.")
+    ] = "sobol",
+    yaw: Annotated[float | None, typer.Option(help="Degrees in which objects start; without it all.")] = None,
+    x: Annotated[tuple[float, float] | None, typer.Option(help="Bounds on where objects start, m, base frame.")] = None,
+    y: Annotated[tuple[float, float] | None, typer.Option(help="Likewise.")] = None,
+    reset: Annotated[
+        str, typer.Option(help="Who brings the object back: the robot, or teleport, which only simulation has.")
+    ] = "robot",
+    threshold: Annotated[
+        float, typer.Option(min=0.001, max=0.2, help="m from its place within which an object has arrived.")
+    ] = 0.03,
+    attempts: Annotated[int, typer.Option(min=1, max=10, help="At each start.")] = 2,
+    fps: Annotated[float, typer.Option(min=1, max=50, help="Rows a second.")] = 10.0,
+    width: Annotated[int, typer.Option(min=16, help="px of recorded pictures.")] = 320,
+    height: Annotated[int, typer.Option(min=16, help="px")] = 240,
+    depth: Annotated[bool, typer.Option("--depth", help="Record depth as well.")] = False,
+    cache: Annotated[
+        Path | None, typer.Option(help="Action sequences that worked (docs/cache.md) are taken from here first.")
+    ] = None,
+    stage_only: Annotated[
+        bool, typer.Option("--stage-only", help="Leave the episodes staged; `maniagent data build` makes the dataset.")
+    ] = False,
+    lerobot_python: Annotated[
+        Path | None,
+        typer.Option(help="A Python that has lerobot, if this one hasn't.", envvar="MANIAGENT_LEROBOT_PYTHON"),
+    ] = None,
+    as_json: Json = False,
+) -> None:
+    """Collect demonstrations: the robot carries the task out, brings the object to the next start, and so on.
+
+    No model is asked: sequences come from the cache or from the rules and are bound to every scene. An episode is valid
+    when a look finds the object where it was to be. The folder holds a LeRobotDataset v3 in dataset/, summary.md, maps
+    of where episodes started, and what is doubtful in episodes/quarantine. Stopped or killed, the same command goes
+    on; with a larger -n it collects more.
+
+    [bold]Examples[/]
+
+      maniagent collect carrot-on-plate -n 300 --workers 2 --out carrots
+
+      maniagent collect hungry --do "put the apple on the hand" -n 50 --say "I would like to eat something"
+
+    Exit status: 0 when there are as many valid episodes as wanted; 2 wrong use, missing set-up, a full disk, a robot
+    that needs help; 130 Ctrl-C.
+    """
+    with errors_told(as_json):
+        from ..data.collector import collect as run
+        from ..data.lerobot import Writer
+        from ..data.progress import CollectProgress
+        from ..data.settings import checked_settings
+        from ..robots.sampling import Sampling
+
+        settings = checked_settings(
+            task,
+            do,
+            cache,
+            count=count,
+            seed=seed,
+            workers=workers,
+            paraphrases=tuple(say or ()),
+            pattern=pattern,
+            yaw=None if yaw is None else math.radians(yaw),
+            x=x,
+            y=y,
+            reset=reset,
+            threshold=threshold,
+            attempts=attempts,
+            sampling=Sampling(rate=fps, width=width, height=height, depth=depth),
+        )
+        if stage_only:
+            with CollectProgress() as progress:
+                summary = run(settings, out, progress, None)
+        else:
+            with Writer(lerobot_python) as writer, CollectProgress() as progress:
+                summary = run(settings, out, progress, writer)
+        _tell(summary, as_json)
+
+
+def _tell(summary: Summary, as_json: bool) -> None:
+    from ..console.output import print_json, print_table
+    from ..data.summary import rows
+
+    if as_json:
+        print_json(summary.model_dump())
+    else:
+        print_table(("what", "figure"), rows(summary))
