@@ -36,7 +36,7 @@ format: dev ## Put the code into shape
 	$(BIN)/ruff format .
 	$(BIN)/ruff check --fix .
 
-bench: dev ## Measure perception, inverse kinematics, planning and physics on one core
+bench: dev ## Measure perception, kinematics, planning, physics, recording; with a model also its answers
 	@for script in benchmarks/*.py; do echo "== $$script"; $(BIN)/python "$$script" || exit 1; done
 
 clean: ## Remove what was made here, but no runs

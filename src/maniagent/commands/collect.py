@@ -47,7 +47,7 @@ def collect(
         Path | None, typer.Option(help="Action sequences that worked (docs/cache.md) are taken from here first.")
     ] = None,
     stage_only: Annotated[
-        bool, typer.Option("--stage-only", help="Leave the episodes staged; `maniagent data build` makes the dataset.")
+        bool, typer.Option("--stage-only", help="Leave the episodes staged; `maniagent data publish` makes the dataset.")
     ] = False,
     lerobot_python: Annotated[
         Path | None,
