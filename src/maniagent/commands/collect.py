@@ -47,7 +47,8 @@ def collect(
         Path | None, typer.Option(help="Action sequences that worked (docs/cache.md) are taken from here first.")
     ] = None,
     stage_only: Annotated[
-        bool, typer.Option("--stage-only", help="Leave the episodes staged; `maniagent data publish` makes the dataset.")
+        bool,
+        typer.Option("--stage-only", help="Leave the episodes staged, for `maniagent data publish`."),
     ] = False,
     lerobot_python: Annotated[
         Path | None,
