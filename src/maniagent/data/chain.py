@@ -14,7 +14,7 @@ from ..errors import CameraFailure, FailureStage, ManiAgentError, StageFailure
 from ..robots.sampling import RecordableRobot, Sampling
 from ..types import RunResult, RunVerdict
 from .episode import Label, Recording
-from .moves import Move, agents_for, move_to
+from .moves import Move, agents_for, move_to, moves_of
 from .outcome import THRESHOLD, Outcomes
 from .recording import EpisodeRecorder
 from .starts import Start
@@ -76,13 +76,20 @@ class Chain:
 
         Raises Stuck where the robot can't get hold of the object at all, wherever it was to go.
         """
-        result = self._run((move_to(self.moved, start.xy, start.yaw),), self._settings.bring_attempts)
+        carry = (move_to(self.moved, start.xy, start.yaw),)
+        result = self._run(carry, self._settings.bring_attempts)
+        if result.verdict is not RunVerdict.ACHIEVED and not _refused(result) and self._pull_to(start):
+            result = self._run(carry, self._settings.bring_attempts)
         if result.verdict is RunVerdict.ACHIEVED:
             return ""
-        last = result.subtasks[-1] if result.subtasks else None
-        if last is not None and last.outcome.stage == FailureStage.PLANNING and last.objects:
+        if _refused(result):
             return result.reason
         raise Stuck(f"The {self.moved} can't be brought to its next start: {result.reason}")
+
+    def _pull_to(self, start: Start) -> bool:
+        """Drag the object where it can't be lifted: what lies on its edge, or too flat, may lie better afterwards."""
+        x, y = start.xy
+        return self._run(moves_of(f"drag the {self.moved} to ({x:.2f}, {y:.2f})"), 1).verdict is RunVerdict.ACHIEVED
 
     def perform(self, seed: int) -> Attempt:
         """Carry out the task once, recorded; `seed` draws the noise of the recorded pictures."""
@@ -120,3 +127,9 @@ class Chain:
         agents = agents_for(self._robot.rig, moves, self._outcomes, attempts)
         budget = Budget(turns=len(moves) * attempts + 1)
         return AgentLoop(self._robot, agents, self._log, budget).run(", then ".join(move.text for move in moves))
+
+
+def _refused(result: RunResult) -> bool:
+    """Whether the object was found, and the way to where it was to go was refused."""
+    last = result.subtasks[-1] if result.subtasks else None
+    return last is not None and last.outcome.stage == FailureStage.PLANNING and bool(last.objects)

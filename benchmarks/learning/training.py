@@ -2,7 +2,7 @@
 
 For an interpreter that has lerobot; nothing of maniagent is needed:
 
-    LEROBOT/bin/python benchmarks/lerobot/training.py demos/dataset --steps 200
+    LEROBOT/bin/python benchmarks/learning/training.py demos/dataset --steps 200
 
 Images are shrunk, and the network is a fraction of lerobot's default, so that 200 steps take minutes on two cores. The
 loss is ACT's: the L1 distance between predicted and recorded actions (each dimension in standard deviations), and ten
