@@ -28,6 +28,14 @@ def test_the_empty_hand_may_touch_what_the_thing_it_takes_lies_on_and_nothing_el
     assert elsewhere.touches == {2}
 
 
+def test_what_lies_in_a_container_may_be_taken_although_the_rim_is_higher_and_not_what_lies_on_what_is_taken() -> None:
+    basket = made_object(1, "basket", (0.30, 0.00), size=(0.18, 0.18, 0.10))
+    (taken,) = allow_supports([point(frozenset({0}))], (PEPPER, basket))
+    assert taken.touches == {0, 1}
+    (dragged,) = allow_supports([point(frozenset({1}))], (PEPPER, PLATE))
+    assert dragged.touches == {1}
+
+
 @pytest.mark.slow
 def test_what_was_put_on_a_plate_can_be_taken_off_again() -> None:
     outcome = run("put the carrot on the plate, then put the carrot at (0.30, -0.20)", task="carrot-on-plate", seed=1)

@@ -1,4 +1,4 @@
-"""What things lie on may be touched when they are picked up: a plate's bounding box is fuller than the plate.
+"""What things lie on or in may be touched when they are picked up: a plate's bounding box is fuller than the plate.
 
 Whether the fingers have room is known better: grasps are proposed where the depth image leaves it.
 """
@@ -30,9 +30,9 @@ def allow_supports(keypoints: Sequence[KeyPoint], things: Sequence[ObjectInfo]) 
 
 
 def _supports(thing: ObjectInfo, others: Sequence[ObjectInfo]) -> Iterator[int]:
-    """Indices of what is under the thing's middle and lower than it."""
+    """Indices of what the thing's middle is over and that is larger from above; a container's rim may be higher."""
     for other in others:
         local = rotation_z(-other.yaw)[:2, :2] @ (thing.centre[:2] - other.centre[:2])
-        under = (np.abs(local) <= other.extent[:2] / 2).all() and other.top_z < thing.top_z
-        if other.index != thing.index and under:
+        under = (np.abs(local) <= other.extent[:2] / 2).all()
+        if other.index != thing.index and under and np.prod(other.extent[:2]) > np.prod(thing.extent[:2]):
             yield other.index

@@ -15,6 +15,8 @@ from .staging import Staging
 from .starts import Start
 from .station import TwinStation
 
+MOST_REFUSALS = 5
+"""Starts in a row that can't be had, before a person is asked: then it is where the object lies that is at fault."""
 MOST_INTERVENTIONS = 5
 """In a row, before a worker gives up: then it isn't the scene that is at fault."""
 
@@ -28,7 +30,7 @@ class Share:
         """`tell` hears of every attempt, once it is on the disk."""
         self._settings, self._worker, self._folder, self._tell = settings, worker, folder, tell
         self._staging = Staging(folder / STAGED, keep_failed=False)
-        self._interventions = 0
+        self._refusals = self._interventions = 0
 
     def collect(self) -> None:
         """Go on until the quota is reached.
@@ -75,7 +77,12 @@ class Share:
         if self._settings.reset == "teleport":
             station.put(start)
             return ""
-        return station.chain.bring(start)
+        why = station.chain.bring(start)
+        self._refusals = self._refusals + 1 if why else 0
+        if self._refusals >= MOST_REFUSALS:
+            self._refusals = 0
+            raise Stuck(why)
+        return why
 
     def _keep(
         self, station: TwinStation, start: Start, number: int, attempt: Attempt, began: float, interventions: int
