@@ -5,6 +5,7 @@ import json
 import signal
 import threading
 import time
+from collections.abc import Iterator
 from typing import Any
 
 import pytest
@@ -277,6 +278,15 @@ def test_checks_run_on_the_thread_that_asks() -> None:
     assert threads == [threading.current_thread()]
 
 
+@pytest.fixture
+def interruptible() -> Iterator[None]:
+    """What a shell puts into the background ignores Ctrl-C, tests too."""
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)
+    yield
+    signal.signal(signal.SIGINT, before)
+
+
+@pytest.mark.usefixtures("interruptible")
 def test_ctrl_c_ends_the_wait_for_an_answer_and_is_told() -> None:
     main = threading.main_thread().ident
     assert main is not None
