@@ -97,7 +97,7 @@ def test_what_is_out_of_view_did_not_arrive_and_has_no_distance() -> None:
 @given(yaw=st.floats(-math.pi, math.pi), x=st.floats(0.15, 0.4), y=st.floats(-0.25, 0.25))
 def test_an_object_is_brought_to_a_start_with_its_yaw(yaw: float, x: float, y: float) -> None:
     keypoints = bind(move_to("carrot", (x, y), yaw).sequence, (CARROT,), VIEWPOINT)
-    assert release_point(keypoints, (CARROT,)) == pytest.approx((x, y))
+    assert release_point(keypoints, (CARROT,)) == pytest.approx((x, y), abs=6e-4)  # the millimetre that is said
     turned = keypoints[4].T_base_tcp[:3, :3] @ keypoints[1].T_base_tcp[:3, :3].T
     axis = turned @ rotation_z(CARROT.yaw)[:, 0]
     assert abs(axis[0] * math.cos(yaw) + axis[1] * math.sin(yaw)) == pytest.approx(1.0)

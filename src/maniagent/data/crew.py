@@ -6,7 +6,6 @@ import contextlib
 import multiprocessing
 import os
 import signal
-import threading
 import time
 import traceback
 from collections.abc import Iterator
@@ -14,6 +13,7 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
 from ..errors import ManiAgentError, SetupError
+from ..processes import become_worker
 from .episode import EpisodeInfo
 from .settings import CollectSettings
 from .share import Share
@@ -117,12 +117,8 @@ class _Worker:
 
 def _work(connection: Connection, settings: CollectSettings, number: int, folder: Path) -> None:
     """What a worker process does."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
-    log = os.open(folder / f"worker-{number:02d}.log", os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644)
-    os.dup2(log, 2)
-    os.dup2(2, 1)
+    become_worker(folder / f"worker-{number:02d}.log")
     os.environ.setdefault("LP_NUM_THREADS", "0")  # software rendering: workers share the cores already
-    threading.Thread(target=_die_with_parent, daemon=True).start()
     try:
         Share(settings, number, folder, connection.send).collect()
     except ManiAgentError as error:
@@ -134,11 +130,3 @@ def _work(connection: Connection, settings: CollectSettings, number: int, folder
         raise
     else:
         connection.send(_DONE)
-
-
-def _die_with_parent() -> None:
-    """End this process when its parent is gone, even by SIGKILL."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)

@@ -18,25 +18,8 @@ from ..agents.rules import rules_agents
 from ..agents.rules.controller import RulesControllerAgent
 from ..agents.rules.language import parse_instruction
 from ..perception.rig import Rig
-from ..types import (
-    ActionSequence,
-    ActionStep,
-    Gripper,
-    HereAnchor,
-    ObjectAnchor,
-    ObjectInfo,
-    Orientation,
-    Part,
-    PointAnchor,
-    SceneDescription,
-    Subtask,
-    SubtaskRecord,
-    Verdict,
-)
+from ..types import ActionSequence, ObjectInfo, Orientation, SceneDescription, Subtask, SubtaskRecord, Verdict
 from .outcome import Outcomes
-
-HOVER, SETTLE = 0.10, 0.006
-"""m above a place: on the way, and where things are let go."""
 
 
 class Move(BaseModel):
@@ -67,40 +50,15 @@ def moves_of(instruction: str, cache: ActionCache | None = None) -> tuple[Move, 
 
 def move_to(name: str, xy: Sequence[float], yaw: float | None = None) -> Move:
     """Put object `name` at `xy` (m, base frame); its long side along `yaw` (rad, base frame) where that is given."""
-    x, y = float(xy[0]), float(xy[1])
-    place = PointAnchor(x=x, y=y)
-    lie = Orientation() if yaw is None else Orientation(kind="align", yaw=float(yaw), frame="base")
-    grasp, as_grasp = ObjectAnchor(index=0, part=Part.GRASP), Orientation(kind="grasp", index=0)
-    steps = (
-        ActionStep(
-            description=f"Go above the {name}, fingers open",
-            anchor=grasp,
-            offset=(0.0, 0.0, HOVER),
-            orientation=as_grasp,
-            gripper=Gripper.OPEN,
-        ),
-        ActionStep(
-            description=f"Go down and take the {name}", anchor=grasp, orientation=as_grasp, gripper=Gripper.CLOSE
-        ),
-        ActionStep(description="Lift it", anchor=HereAnchor(here=True), offset=(0.0, 0.0, HOVER)),
-        ActionStep(
-            description=f"Carry it to ({x:.2f}, {y:.2f})",
-            anchor=place,
-            offset=(0.0, 0.0, HOVER),
-            carrying=0,
-            orientation=lie,
-        ),
-        ActionStep(
-            description="Lower it and let go",
-            anchor=place,
-            offset=(0.0, 0.0, SETTLE),
-            carrying=0,
-            gripper=Gripper.OPEN,
-        ),
-        ActionStep(description="Come up", anchor=HereAnchor(here=True), offset=(0.0, 0.0, HOVER)),
-    )
-    sequence = ActionSequence(skill="pick-and-place", steps=steps)
-    return Move(text=f"put the {name} at ({x:.3f}, {y:.3f})", objects=(name,), sequence=sequence)
+    x, y = xy
+    (move,) = moves_of(f"put the {name} at ({x:.3f}, {y:.3f})")
+    if yaw is None:
+        return move
+    steps = list(move.sequence.steps)
+    carry = next(i for i, step in enumerate(steps) if step.carrying is not None)
+    lie = Orientation(kind="align", yaw=yaw, frame="base")
+    steps[carry] = steps[carry].model_copy(update={"orientation": lie})
+    return move.model_copy(update={"sequence": move.sequence.model_copy(update={"steps": tuple(steps)})})
 
 
 def agents_for(rig: Rig, moves: Sequence[Move], outcomes: Outcomes, attempts: int) -> Agents:

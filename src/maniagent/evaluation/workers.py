@@ -4,9 +4,7 @@ from __future__ import annotations
 
 import contextlib
 import multiprocessing
-import os
 import signal
-import threading
 import time
 import traceback
 from collections import deque
@@ -15,6 +13,7 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
 from ..errors import SetupError, UsageError
+from ..processes import become_worker
 from .episode import CRASH, TIME_LIMIT, EpisodeResult, Job, lost
 from .play import Play
 
@@ -150,9 +149,7 @@ class _Worker:
 
 def _serve(connection: Connection[object, Job], play: Play, log: Path | None) -> None:
     """What a worker process does: play one job after another until the connection ends."""
-    signal.signal(signal.SIGINT, signal.SIG_IGN)  # Ctrl-C is the parent's to handle
-    _redirect_output(log)
-    threading.Thread(target=_die_with_parent, daemon=True).start()
+    become_worker(log)
     connection.send(None)
     while True:
         try:
@@ -173,18 +170,3 @@ def _answer(play: Play, job: Job) -> EpisodeResult | UsageError | SetupError:
     except Exception as error:  # noqa: BLE001 - the edge of the process: one crash must not end the evaluation
         traceback.print_exc()
         return lost(job, CRASH, f"{type(error).__name__}: {error}", round(time.monotonic() - start, 2))
-
-
-def _redirect_output(log: Path | None) -> None:
-    """Keep what libraries print, also from C, out of the parent's lines on stdout and its display on stderr."""
-    if log is not None:
-        os.dup2(os.open(log, os.O_WRONLY | os.O_CREAT | os.O_APPEND, 0o644), 2)
-    os.dup2(2, 1)
-
-
-def _die_with_parent() -> None:
-    """End this process when its parent is gone, even by SIGKILL: nobody would hear of the episode any more."""
-    parent = multiprocessing.parent_process()
-    if parent is not None:
-        parent.join()
-        os._exit(1)
