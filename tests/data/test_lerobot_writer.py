@@ -16,6 +16,9 @@ from typing import Any
 
 import numpy as np
 import pytest
+from hypothesis import given
+from hypothesis import strategies as st
+from hypothesis.extra.numpy import arrays
 from lerobot_python import PYTHON, needs_lerobot
 from numpy.typing import NDArray
 from PIL import Image
@@ -24,6 +27,7 @@ from staged import FPS, made_recording, stage
 from maniagent.data.episode import JOINTS, Recording
 from maniagent.data.lerobot import Writer, merge, publish, split
 from maniagent.data.lerobot.ledger import read_ledger
+from maniagent.data.lerobot.writer import moments, quantiles
 from maniagent.errors import UsageError
 
 pytestmark = [needs_lerobot, pytest.mark.slow]
@@ -133,6 +137,18 @@ def test_image_statistics_are_those_of_the_images(made: Made, name: str) -> None
     images = np.concatenate([recording.rgb["main"] for _, recording in made.expected(name)]) / 255
     assert np.allclose(np.ravel(stats["mean"]), images.mean(axis=(0, 1, 2)), atol=1e-3)
     assert np.allclose(np.ravel(stats["std"]), images.std(axis=(0, 1, 2)), atol=1e-3)
+
+
+@given(arrays(np.uint8, st.tuples(st.integers(1, 40), st.just(3))))
+def test_counted_bytes_have_the_statistics_of_the_bytes(bytes_: NDArray[np.uint8]) -> None:
+    counts = np.stack([np.bincount(channel, minlength=256) for channel in bytes_.T])
+    found = moments(counts)
+    for name in ("min", "max", "mean", "std"):
+        assert np.allclose(found[name], getattr(bytes_, name)(axis=0)), name
+    assert found["count"] == [len(bytes_)]
+    shares = [0.01, 0.5, 0.99]
+    expected = np.quantile(bytes_, shares, axis=0, method="inverted_cdf")
+    assert np.allclose(quantiles(counts, shares), expected)
 
 
 def test_the_dataset_says_what_it_is(made: Made) -> None:
