@@ -20,9 +20,8 @@ from ...errors import ManiAgentError, SetupError
 from .interpreter import HOW, find_interpreter
 
 SCRIPT = Path(__file__).with_name("writer.py")
-CODEC = "libsvtav1"
-"""The videos' codec: lerobot's own choice. At the quality that lerobot fixes (crf 30 for every codec) h264 costs a
-fifth less processor time, but its images are 2.5 dB worse, and what `split` encodes anew would be of another codec."""
+CODEC = "h264"
+"""The videos' codec, of new datasets; an old one keeps its own. "libsvtav1" is lerobot's choice (docs/data.md)."""
 
 
 class WriterFailure(ManiAgentError):
