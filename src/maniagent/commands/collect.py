@@ -23,9 +23,23 @@ def collect(
     do: Annotated[
         str | None, typer.Option(help="What is carried out, as a plain command, if it isn't the instruction itself.")
     ] = None,
+    run: Annotated[
+        Path | None,
+        typer.Option(
+            "--from", help="Carried out is what was done in this run folder, by whatever model.", metavar="RUN"
+        ),
+    ] = None,
+    call: Annotated[
+        list[str] | None,
+        typer.Option(metavar="NAME=OTHER", help="What an object of that run is to be called; may be repeated."),
+    ] = None,
     say: Annotated[
         list[str] | None, typer.Option(help="Another way to say the instruction, for the labels; may be repeated.")
     ] = None,
+    say_file: Annotated[Path | None, typer.Option(help="More of them, one a line.")] = None,
+    texts: Annotated[
+        str, typer.Option(help="What each row says is being done: the subtask, or the single move of it.")
+    ] = "subtask",
     pattern: Annotated[
         str, typer.Option(help="How starts follow each other: sobol, random, grid, shuffled-grid.")
     ] = "sobol",
@@ -58,35 +72,40 @@ def collect(
 ) -> None:
     """Collect demonstrations: the robot carries the task out, brings the object to the next start, and so on.
 
-    No model is asked: sequences come from the cache or from the rules and are bound to every scene. An episode is valid
-    when a look finds the object where it was to be. The folder holds a LeRobotDataset v3 in dataset/, summary.md, maps
-    of where episodes started, and what is doubtful in episodes/quarantine. Stopped or killed, the same command goes
-    on; with a larger -n it collects more.
+    No model is asked: sequences come from the rules, the cache, or a run that a model once made, and are bound to every
+    scene. An episode is valid when a look finds the object where it was to be. The folder holds a LeRobotDataset v3 in
+    dataset/, summary.md, maps of where episodes started, and what is doubtful in episodes/quarantine. Stopped or
+    killed, the same command goes on; with a larger -n it collects more.
 
     [bold]Examples[/]
 
       maniagent collect carrot-on-plate -n 300 --workers 2 --out carrots
 
-      maniagent collect hungry --do "put the apple on the hand" -n 50 --say "I would like to eat something"
+      maniagent collect hungry --do "put the banana on the plate" -n 50 --say "I would like to eat something"
+
+      maniagent collect menemen --from runs/menemen --call "brown egg=egg" -n 50
 
     Exit status: 0 when there are as many valid episodes as wanted; 2 wrong use, missing set-up, a full disk, a robot
     that needs help; 130 Ctrl-C.
     """
     with errors_told(as_json):
-        from ..data.collector import collect as run
+        from ..data.collector import collect as collected
         from ..data.lerobot import Writer
         from ..data.progress import CollectProgress
-        from ..data.settings import checked_settings
+        from ..data.settings import checked_settings, phrases_in, read_calls
         from ..robots.sampling import Sampling
 
         settings = checked_settings(
             task,
             do,
             cache,
+            run=run,
+            called=read_calls(call or ()),
             count=count,
             seed=seed,
             workers=workers,
-            paraphrases=tuple(say or ()),
+            paraphrases=(*(say or ()), *(phrases_in(say_file) if say_file is not None else ())),
+            texts=texts,
             pattern=pattern,
             yaw=None if yaw is None else math.radians(yaw),
             x=x,
@@ -98,10 +117,10 @@ def collect(
         )
         if stage_only:
             with CollectProgress() as progress:
-                summary = run(settings, out, progress, None)
+                summary = collected(settings, out, progress, None)
         else:
             with Writer(lerobot_python) as writer, CollectProgress() as progress:
-                summary = run(settings, out, progress, writer)
+                summary = collected(settings, out, progress, writer)
         _tell(summary, as_json)
 
 

@@ -12,11 +12,11 @@ from ..agents.events import EventLog
 from ..agents.loop import AgentLoop, Budget
 from ..errors import CameraFailure, FailureStage, ManiAgentError, StageFailure
 from ..robots.sampling import RecordableRobot, Sampling
-from ..types import RunResult, RunVerdict
+from ..types import ObjectInfo, RunResult, RunVerdict
 from .episode import Label, Recording
 from .moves import Move, agents_for, move_to, moves_of
 from .outcome import THRESHOLD, Outcomes
-from .recording import EpisodeRecorder
+from .recording import EpisodeRecorder, RecorderSettings
 from .starts import Start
 
 DOUBT = 0.005
@@ -48,7 +48,9 @@ class ChainSettings:
     threshold: float = THRESHOLD
     """m"""
     bring_attempts: int = 3
-    """At bringing the object to one start."""
+    """At bringing an object to one place."""
+    by_move: bool = False
+    """Whether rows tell of single moves instead of sub-tasks."""
 
 
 class Chain:
@@ -63,19 +65,42 @@ class Chain:
     ) -> None:
         self._robot, self._moves, self._settings = robot, tuple(moves), settings
         self._outcomes = Outcomes(settings.threshold)
-        self._recorder = EpisodeRecorder(robot, sampling)
+        self._recorder = EpisodeRecorder(robot, sampling, RecorderSettings(by_move=settings.by_move))
         self._log = EventLog([self._outcomes, self._recorder])
+        self._homes: dict[str, ObjectInfo] = {}
+        """Where the things that the task moves later were when they were first moved."""
+        self._astray: dict[str, None] = {}
+        """Those of them that aren't there now, in the order in which they left."""
 
     @property
     def moved(self) -> str:
-        """What the object is called that the task moves first, and that is brought back."""
+        """What the object is called that the task moves first, and that is brought to each start."""
         return self._moves[0].objects[0]
 
     def bring(self, start: Start) -> str:
         """Put the object at a start; returns why that start can't be had, empty where the object is there.
 
-        Raises Stuck where the robot can't get hold of the object at all, wherever it was to go.
+        Before that everything else that the task moves goes back to where it began, what was moved last first. Raises
+        Stuck where the robot can't get hold of an object at all, wherever it was to go: then a person puts all of them
+        back.
         """
+        try:
+            for name in reversed(list(self._astray)):
+                self._bring_home(name)
+            return self._bring_to(start)
+        except Stuck:
+            self._astray.clear()
+            raise
+
+    def _bring_home(self, name: str) -> None:
+        home = self._homes[name]
+        x, y = map(float, home.centre[:2])
+        result = self._run((move_to(name, (x, y), home.yaw),), self._settings.bring_attempts)
+        if result.verdict is not RunVerdict.ACHIEVED:
+            raise Stuck(f"The {name} can't be brought back to where it began, ({x:.2f}, {y:.2f}): {result.reason}")
+        del self._astray[name]
+
+    def _bring_to(self, start: Start) -> str:
         carry = (move_to(self.moved, start.xy, start.yaw),)
         result = self._run(carry, self._settings.bring_attempts)
         if result.verdict is not RunVerdict.ACHIEVED and not _refused(result) and self._pull_to(start):
@@ -99,6 +124,7 @@ class Chain:
         except BaseException:
             self._recorder.cancel()
             raise
+        self._note_moved(result)
         objects = result.subtasks[0].objects if result.subtasks else ()
         began = (float(objects[0].centre[0]), float(objects[0].centre[1])) if objects else None
         try:
@@ -108,6 +134,14 @@ class Chain:
             return Attempt("failed", reason, None, None, began)
         label, reason, distance = self._judge(result)
         return Attempt(label, reason, distance, recording, began)
+
+    def _note_moved(self, result: RunResult) -> None:
+        """Remember what has to go back before the next start besides the object that is brought there anyway."""
+        for record in result.subtasks:
+            name = record.queries[0]
+            if record.sequence is not None and name != self.moved:
+                self._homes.setdefault(name, record.objects[0])
+                self._astray[name] = None
 
     def _judge(self, result: RunResult) -> tuple[Label, str, float | None]:
         """The label, why it isn't valid, and the farthest distance (m) from where things were to be."""

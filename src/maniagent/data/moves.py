@@ -17,8 +17,11 @@ from ..agents.protocols import Agents
 from ..agents.rules import rules_agents
 from ..agents.rules.controller import RulesControllerAgent
 from ..agents.rules.language import parse_instruction
+from ..errors import DetectionFailure, UsageError
+from ..perception.referring import read_reference
 from ..perception.rig import Rig
-from ..types import ActionSequence, ObjectInfo, Orientation, SceneDescription, Subtask, SubtaskRecord, Verdict
+from ..perception.vocabulary import Vocabulary
+from ..types import ActionSequence, Gripper, ObjectInfo, Orientation, SceneDescription, Subtask, SubtaskRecord, Verdict
 from .outcome import Outcomes
 
 
@@ -46,6 +49,30 @@ def moves_of(instruction: str, cache: ActionCache | None = None) -> tuple[Move, 
         sequence = controller.write(subtask, ()) if hit is None else hit.sequence
         moves.append(Move(text=subtask.text, objects=objects, sequence=sequence))
     return tuple(moves)
+
+
+def check_moves(moves: Sequence[Move]) -> None:
+    """Make sure that moves can be collected, as far as that shows before anything is looked at.
+
+    Raises UsageError for a name that the lexicon, which finds things while collecting, doesn't understand; for a thing
+    that moves and is told by its place, since every episode begins with it elsewhere; and for what isn't let go, since
+    success is where it lies then.
+    """
+    vocabulary = Vocabulary.load()
+    moved = {move.objects[0] for move in moves}
+    for move in moves:
+        for name in move.objects:
+            try:
+                reference = read_reference(name, vocabulary)
+            except DetectionFailure as failure:
+                raise UsageError(f"While collecting, nothing can be found by the name {name!r}: {failure}") from failure
+            if name in moved and (reference.pick or reference.ordinal or reference.where):
+                raise UsageError(
+                    f"{name!r} is told by its place, and every episode begins with it at another. Name it by its looks."
+                )
+        grips = [step.gripper for step in move.sequence.steps]
+        if Gripper.CLOSE not in grips or Gripper.OPEN not in grips[grips.index(Gripper.CLOSE) :]:
+            raise UsageError(f"{move.text!r} takes nothing anywhere and lets it go, so success can't be measured.")
 
 
 def move_to(name: str, xy: Sequence[float], yaw: float | None = None) -> Move:

@@ -10,6 +10,7 @@ coverage.png, summary.json, summary.md
 
 from __future__ import annotations
 
+from collections.abc import Mapping, Sequence
 from pathlib import Path
 from typing import Annotated, Any, Literal, Self
 
@@ -20,12 +21,14 @@ from ..envs.scene import describe_validation
 from ..errors import ReasoningFailure, UsageError
 from ..robots.sampling import Sampling
 from ..tasks import task_named
-from .moves import Move, moves_of
+from .learnt import learnt_moves
+from .moves import Move, check_moves, moves_of
 from .outcome import THRESHOLD
 from .starts import Pattern
 
 SETTINGS = "collect.json"
 Reset = Literal["robot", "teleport"]
+Texts = Literal["subtask", "move"]
 Span = tuple[float, float]
 
 
@@ -52,6 +55,8 @@ class CollectSettings(BaseModel):
     y: Span | None = None
     """m: bounds on where objects start; None for the whole reachable table."""
     reset: Reset = "robot"
+    texts: Texts = "subtask"
+    """What each row says is being done: the sub-task, or the single move of it."""
     sampling: Sampling = Sampling()
     threshold: Annotated[float, Field(gt=0, le=0.2)] = THRESHOLD
     """m"""
@@ -98,23 +103,73 @@ class CollectSettings(BaseModel):
             )
 
 
-def checked_settings(task: str, do: str | None, cache: Path | None, **said: Any) -> CollectSettings:
-    """Settings for a task by its name or scene file, with the moves that `do`, else its own instruction, takes.
+def checked_settings(
+    task: str,
+    do: str | None,
+    cache: Path | None,
+    *,
+    run: Path | None = None,
+    called: Mapping[str, str] | None = None,
+    **said: Any,
+) -> CollectSettings:
+    """Settings for a task by its name or scene file, with the moves that carry it out.
+
+    Those are what `do`, else its own instruction, takes, out of `cache` first; or what was done in the folder of a
+    recorded `run`, in which objects may be `called` otherwise.
 
     Raises UsageError for an unknown task, one that draws its instruction anew each time, settings that make no sense,
-    and what takes a language model to carry out.
+    moves that can't be collected, and what takes a language model to carry out.
     """
     chosen = task_named(task)
     if chosen.points:
         raise UsageError(f"{task} draws the points of its instruction: say one with --do to collect for it.")
     if not chosen.success:
         raise UsageError(f"{task} says of no object where it should be; a scene to collect in needs `success`.")
-    store = ActionCache(CacheStore(cache, must_exist=True)) if cache is not None else None
-    try:
-        moves = moves_of(do or chosen.instruction, store)
-    except ReasoningFailure as failure:
-        raise UsageError(f"{failure} Say with --do, in plain commands, what carries it out.") from failure
+    if run is not None and (do is not None or cache is not None):
+        raise UsageError("--from takes the moves out of a run; leave out --do and --cache.")
+    if called and run is None:
+        raise UsageError("--call renames the objects of a run; it needs --from.")
+    if run is not None:
+        moves = learnt_moves(run, chosen.instruction, called)
+    else:
+        moves = _plain_moves(do or chosen.instruction, cache)
+    check_moves(moves)
     try:
         return CollectSettings(task=task, instruction=chosen.instruction, moves=moves, **said)
     except ValidationError as error:
         raise UsageError(describe_validation(error)) from error
+
+
+def _plain_moves(instruction: str, cache: Path | None) -> tuple[Move, ...]:
+    store = ActionCache(CacheStore(cache, must_exist=True)) if cache is not None else None
+    try:
+        return moves_of(instruction, store)
+    except ReasoningFailure as failure:
+        raise UsageError(
+            f"{failure} Say with --do, in plain commands, what carries it out, or take it from a run with --from."
+        ) from failure
+
+
+def phrases_in(path: Path) -> tuple[str, ...]:
+    """The paraphrases in a file, one a line. Raises UsageError where it can't be read, or says none."""
+    try:
+        lines = path.read_text(encoding="utf-8-sig").splitlines()
+    except OSError as error:
+        raise UsageError(f"{path} can't be read: {error.strerror}.") from error
+    except UnicodeDecodeError as error:
+        raise UsageError(f"{path} is no text in UTF-8.") from error
+    phrases = tuple(dict.fromkeys(line.strip() for line in lines if line.strip()))
+    if not phrases:
+        raise UsageError(f"{path} says nothing; it should have a paraphrase a line.")
+    return phrases
+
+
+def read_calls(said: Sequence[str]) -> dict[str, str]:
+    """From "NAME=OTHER" to what each name is to be. Raises UsageError for anything else."""
+    called = {}
+    for text in said:
+        name, equals, other = (part.strip() for part in text.partition("="))
+        if not (name and equals and other) or name in called:
+            raise UsageError(f"--call takes NAME=OTHER, each name once, as in --call 'brown egg=egg'; not {text!r}.")
+        called[name] = other
+    return called

@@ -37,7 +37,12 @@ class TwinStation:
         self._env.reset(seed=_seed(settings.seed, worker))
         self._episode = task.episode(self._env.layout, np.random.default_rng([settings.seed, worker]))
         robot = SimulatedRobot(self._env)
-        self.chain = Chain(robot, settings.moves, settings.sampling, ChainSettings(threshold=settings.threshold))
+        self.chain = Chain(
+            robot,
+            settings.moves,
+            settings.sampling,
+            ChainSettings(threshold=settings.threshold, by_move=settings.texts == "move"),
+        )
         self._keep_free(folder / plan_name(worker), robot)
         self._region = region_of(settings, folder, worker)
 

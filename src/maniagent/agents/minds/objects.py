@@ -2,13 +2,11 @@
 
 from __future__ import annotations
 
-import re
 from collections.abc import Sequence
 
 import numpy as np
 
-from ...errors import DetectionFailure, ReasoningFailure
-from ...geometry import FloatArray
+from ...errors import DetectionFailure
 from ...models.question import ChatModel, Picture, Question, Unfit
 from ...perception.detectors.pictures import draw_marks
 from ...perception.detectors.protocol import Match
@@ -20,8 +18,7 @@ from ...types import BoolArray, Observation, Subtask
 from ..locating import assemble, offer_grasps
 from ..memory import Memory
 from ..protocols import Located
-from ..rules.controller import direction_of
-from ..rules.language import parse_instruction
+from ..rules.controller import drag_direction
 from .answers import Choice
 from .eyes import Eyes
 from .prompts import Prompt
@@ -32,7 +29,6 @@ MOST_ALIKE = 12
 """Look-alikes that are numbered on one picture."""
 COVERED = 0.5
 """Share of one segment's pixels that lie in another's, from which the two are one thing."""
-_DRAG = re.compile(r"\b(?:drag|pull|push|slide|shove)\b", re.IGNORECASE)
 
 
 class MindObjectAgent:
@@ -64,7 +60,7 @@ class MindObjectAgent:
         }
         found = self._resolve(subtask, observation, known)
         moved = found[0].segment
-        way = _way(subtask.text, moved, Viewpoint.of(observation))
+        way = drag_direction(subtask.text, moved.centre[:2], Viewpoint.of(observation))
         grasps = offer_grasps(subtask.objects[0], moved, view, self._rig, attempts_at(subtask, memory), way)
         chosen = [(q, match.segment, match.detection) for q, match in zip(subtask.objects, found, strict=True)]
         others = [s for s in view.segments if not any(_covers(match.segment, s) for match in found)]
@@ -106,17 +102,6 @@ class MindObjectAgent:
                 f"None of {len(shown)} things found is the {one_line(query)}: {one_line(choice.reason)}"
             )
         return shown[choice.number - 1][0]
-
-
-def _way(text: str, moved: Segment, viewpoint: Viewpoint) -> FloatArray | None:
-    """The direction (2,) of a drag, as far as the rules read it out of the sub-task; None for what is no drag."""
-    if not _DRAG.search(text):
-        return None
-    try:
-        command = parse_instruction(text)[0]
-    except ReasoningFailure:
-        return np.zeros(2)
-    return direction_of(command, moved.centre[:2], viewpoint)
 
 
 def _same(a: Segment, b: Segment) -> bool:

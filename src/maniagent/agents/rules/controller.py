@@ -7,6 +7,7 @@ it is brought to. No number depends on where things are today.
 from __future__ import annotations
 
 import math
+import re
 from collections.abc import Sequence
 from dataclasses import dataclass
 from typing import Literal
@@ -45,6 +46,7 @@ PICK_UP_HEIGHT = 0.12
 TURN_HEIGHT = 0.05
 """m above its place at which an object is turned."""
 
+_DRAG = re.compile(r"\b(?:drag|pull|push|slide|shove)\b", re.IGNORECASE)
 _SIDES = {
     Relation.LEFT_OF: Part.LEFT,
     Relation.RIGHT_OF: Part.RIGHT,
@@ -94,6 +96,18 @@ def direction_of(command: Command, start: FloatArray, viewpoint: Viewpoint) -> F
     else:
         return np.zeros(2)
     return way / max(float(np.linalg.norm(way)), 1e-6)
+
+
+def drag_direction(text: str, start: FloatArray, viewpoint: Viewpoint) -> FloatArray | None:
+    """(2,) as of `direction_of` for a sub-task in anybody's words; None where it drags nothing.
+
+    A sub-task that is no plain command drags where it has a word for that; in which direction isn't known.
+    """
+    try:
+        command = parse_instruction(text)[0]
+    except ReasoningFailure:
+        return np.zeros(2) if _DRAG.search(text) else None
+    return direction_of(command, start, viewpoint) if command.action in (Action.DRAG, Action.PUSH) else None
 
 
 def _take(command: Command) -> tuple[ActionStep, ...]:

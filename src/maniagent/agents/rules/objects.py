@@ -13,9 +13,7 @@ from ...types import Observation, Subtask, SubtaskRecord
 from ..locating import assemble, detection_of, find_tried, last_tried, offer_grasps
 from ..memory import Memory
 from ..protocols import Located
-from .commands import Action
-from .controller import direction_of
-from .language import parse_instruction
+from .controller import drag_direction
 
 
 class RulesObjectAgent:
@@ -42,11 +40,9 @@ class RulesObjectAgent:
         chosen = [self._find(i, query, view, viewpoint, attempts) for i, query in enumerate(subtask.objects)]
         if len(set(chosen)) < len(chosen):
             raise DetectionFailure(f"{' and '.join(map(repr, subtask.objects))} mean the same thing.")
-        command = parse_instruction(subtask.text)[0]
         moved = view.segments[chosen[0]]
-        drags = command.action in (Action.DRAG, Action.PUSH)
-        way = direction_of(command, moved.centre[:2], viewpoint) if drags else None
-        grasps = offer_grasps(command.object, moved, view, self._sight.rig, attempts, way)
+        way = drag_direction(subtask.text, moved.centre[:2], viewpoint)
+        grasps = offer_grasps(subtask.objects[0], moved, view, self._sight.rig, attempts, way)
         found = [
             (query, segment, detection_of(segment, query, self._lexicon.score(query, segment), observation))
             for query, segment in zip(subtask.objects, (view.segments[k] for k in chosen), strict=True)
