@@ -231,6 +231,8 @@ def test_an_episode_in_which_nothing_moves_is_none() -> None:
         recorded([made_sample(0, 0.1)] * 10).finish()
     with pytest.raises(StageFailure, match="Nothing moved"):
         recorded([], trim=None).finish()
+    with pytest.raises(StageFailure, match="Nothing moved"):
+        recorded([]).finish()
 
 
 def test_time_begins_with_the_first_row_that_is_kept() -> None:

@@ -14,13 +14,16 @@ from ..errors import CameraFailure, FailureStage, ManiAgentError, StageFailure
 from ..robots.sampling import RecordableRobot, Sampling
 from ..types import ObjectInfo, RunResult, RunVerdict
 from .episode import Label, Recording
-from .moves import Move, agents_for, move_to, moves_of
+from .moves import KnownMoves, Move, move_to, moves_of
 from .outcome import THRESHOLD, Outcomes
 from .recording import EpisodeRecorder, RecorderSettings
 from .starts import Start
 
 DOUBT = 0.005
 """m either side of the threshold within which perception doesn't decide."""
+
+_TURNS = 1000
+"""More than any list of moves takes: a move that fails too often ends the run by itself."""
 
 
 class Stuck(ManiAgentError):
@@ -66,7 +69,10 @@ class Chain:
         self._robot, self._moves, self._settings = robot, tuple(moves), settings
         self._outcomes = Outcomes(settings.threshold)
         self._recorder = EpisodeRecorder(robot, sampling, RecorderSettings(by_move=settings.by_move))
-        self._log = EventLog([self._outcomes, self._recorder])
+        self._known = KnownMoves(self._outcomes)
+        # One loop for all: a robot keeps every loop that listens to it, and a loop what its agents saw last.
+        log = EventLog([self._outcomes, self._recorder])
+        self._loop = AgentLoop(robot, self._known.agents(robot.rig), log, Budget(turns=_TURNS))
         self._homes: dict[str, ObjectInfo] = {}
         """Where the things that the task moves later were when they were first moved."""
         self._astray: dict[str, None] = {}
@@ -158,9 +164,8 @@ class Chain:
 
     def _run(self, moves: Sequence[Move], attempts: int) -> RunResult:
         self._outcomes.begin()
-        agents = agents_for(self._robot.rig, moves, self._outcomes, attempts)
-        budget = Budget(turns=len(moves) * attempts + 1)
-        return AgentLoop(self._robot, agents, self._log, budget).run(", then ".join(move.text for move in moves))
+        self._known.begin(moves, attempts)
+        return self._loop.run(", then ".join(move.text for move in moves))
 
 
 def _refused(result: RunResult) -> bool:

@@ -17,7 +17,7 @@ from ..agents.protocols import Agents
 from ..agents.rules import rules_agents
 from ..agents.rules.controller import RulesControllerAgent
 from ..agents.rules.language import parse_instruction
-from ..errors import DetectionFailure, UsageError
+from ..errors import DetectionFailure, ReasoningFailure, UsageError
 from ..perception.referring import read_reference
 from ..perception.rig import Rig
 from ..perception.vocabulary import Vocabulary
@@ -88,23 +88,26 @@ def move_to(name: str, xy: Sequence[float], yaw: float | None = None) -> Move:
     return move.model_copy(update={"sequence": move.sequence.model_copy(update={"steps": tuple(steps)})})
 
 
-def agents_for(rig: Rig, moves: Sequence[Move], outcomes: Outcomes, attempts: int) -> Agents:
-    """The four roles that carry out `moves` one after the other, each at most `attempts` times."""
-    rules = rules_agents(rig)
-    return Agents(
-        name="known moves",
-        scene=rules.scene,
-        reasoning=_InTurn(moves, outcomes, attempts),
-        objects=rules.objects,
-        controller=_Written(moves),
-    )
+class KnownMoves:
+    """Two roles in one: it reasons which of the moves set before comes next, and has every sequence already.
 
+    A move is done when what it moved lies where it was let go.
+    """
 
-class _InTurn:
-    """A ReasoningAgent that goes through the moves; a move is done when what it moved lies where it was let go."""
+    def __init__(self, outcomes: Outcomes) -> None:
+        self._outcomes = outcomes
+        self._moves: tuple[Move, ...] = ()
+        self._attempts = 1
+        self._current: Move | None = None
 
-    def __init__(self, moves: Sequence[Move], outcomes: Outcomes, attempts: int) -> None:
-        self._moves, self._outcomes, self._attempts = moves, outcomes, attempts
+    def begin(self, moves: Sequence[Move], attempts: int) -> None:
+        """From now on carry out `moves`, one after the other, each at most `attempts` times."""
+        self._moves, self._attempts, self._current = tuple(moves), attempts, None
+
+    def agents(self, rig: Rig) -> Agents:
+        """All four roles; the eyes are those of the rules."""
+        rules = rules_agents(rig)
+        return Agents("known moves", scene=rules.scene, reasoning=self, objects=rules.objects, controller=self)
 
     def next_subtask(self, instruction: str, scene: SceneDescription, memory: Memory) -> Subtask:
         """The next move, or the same again; cannot once it failed too often."""
@@ -115,21 +118,16 @@ class _InTurn:
             done += verdict is Verdict.SUCCESS
         if done == len(self._moves):
             return Subtask(previous=verdict, reason=evidence, done=True)
-        move = self._moves[done]
+        self._current = move = self._moves[done]
         if verdict is Verdict.FAILURE and len(memory.attempts(move.text)) >= self._attempts:
             return Subtask(previous=verdict, reason=evidence, cannot=True)
         return Subtask(previous=verdict, reason=evidence, text=move.text, objects=move.objects)
 
-
-class _Written:
-    """A ControllerAgent that has every sequence already."""
-
-    def __init__(self, moves: Sequence[Move]) -> None:
-        self._sequences = {move.text: move.sequence for move in moves}
-
     def write(self, subtask: Subtask, objects: Sequence[ObjectInfo], feedback: str = "") -> ActionSequence:
         """The sequence, the same again where it was refused: the loop then gives the attempt up."""
-        return self._sequences[subtask.text]
+        if self._current is None:
+            raise ReasoningFailure(f"{subtask.text!r} is none of the moves that are known.")
+        return self._current.sequence
 
     def learn(self, record: SubtaskRecord) -> None:
         """Nothing is learnt while collecting."""

@@ -117,6 +117,8 @@ class EpisodeRecorder:
 
     def _moving_rows(self, samples: Sequence[Sample]) -> range:
         """The rows from the first to the last in which anything moves, and `trim` seconds around them."""
+        if not samples:
+            return range(0)
         moving = np.flatnonzero(_moves(samples))
         if not len(moving):
             return range(0)
