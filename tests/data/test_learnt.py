@@ -4,21 +4,30 @@ from __future__ import annotations
 
 import json
 from collections.abc import Sequence
+from dataclasses import replace
 from pathlib import Path
 
 import pytest
+from typer.testing import CliRunner
 
 from maniagent.agents.events import EventLog
 from maniagent.agents.loop import AgentLoop, Budget
 from maniagent.agents.protocols import Located
+from maniagent.agents.rules import rules_agents
+from maniagent.cli import app
 from maniagent.console.recorder import Recorder
+from maniagent.data.chain import Chain
 from maniagent.data.learnt import learnt_moves
 from maniagent.data.moves import Move, check_moves, moves_of
 from maniagent.data.settings import checked_settings, phrases_in, read_calls
+from maniagent.envs.tabletop import TabletopEnv
 from maniagent.errors import UsageError
 from maniagent.motion import ArmModel
 from maniagent.perception.rig import Rig
 from maniagent.robots.body_filter import BodyFilter
+from maniagent.robots.sampling import Sampling
+from maniagent.robots.simulated import SimulatedRobot
+from maniagent.tasks import task_named
 from maniagent.testing import FakeRobot, ScriptedAgents, made_object
 from maniagent.types import (
     ActionSequence,
@@ -246,3 +255,39 @@ def test_names_are_given_as_pairs() -> None:
             read_calls([wrong])
     with pytest.raises(UsageError, match="each name once"):
         read_calls(["a=b", "a=c"])
+
+
+def test_a_run_that_is_no_help_is_one_line_and_status_2(tmp_path: Path) -> None:
+    folder = run(tmp_path / "run", [FIRST, CANNOT], reports=[SLIPPED])
+    for said in (["--from", str(folder)], ["--call", "egg"], ["--say-file", str(tmp_path / "none")]):
+        result = CliRunner().invoke(app, ["collect", TASK, "--out", str(tmp_path / "out"), "--stage-only", *said])
+        assert (result.exit_code, result.stdout) == (2, "")
+        assert len(result.stderr.splitlines()) <= 4
+    assert not (tmp_path / "out").exists()
+
+
+# The twin -------------------------------------------------------------------------------------------------------
+
+
+@pytest.mark.slow
+def test_what_was_done_in_words_the_rules_can_not_read_is_done_again_without_a_model(tmp_path: Path) -> None:
+    env = TabletopEnv(task_named("hungry").scene)
+    env.reset(seed=2)
+    robot = SimulatedRobot(env)
+    text = "serve the yellow banana on the white plate, so that the person can eat it"
+    serve = Subtask(previous=Verdict.INITIAL, reason="hungry", text=text, objects=("yellow banana", PLATE))
+    said = ScriptedAgents([serve, DONE], [], [moves_of("put the banana on the plate")[0].sequence])
+    agents = replace(rules_agents(robot.rig), reasoning=said, controller=said)
+    with Recorder(tmp_path / "run") as recorder:
+        log = EventLog([recorder])
+        log.emit("run_started", instruction="I am hungry", task="hungry", seed=2, agents=agents.name)
+        result = AgentLoop(robot, agents, log).run("I am hungry")
+        log.emit("run_finished", result=result, achieved=None)
+    moves = learnt_moves(tmp_path / "run", "I am hungry")
+    check_moves(moves)
+    env.reset(seed=3)  # another table: everything lies elsewhere
+    attempt = Chain(SimulatedRobot(env), moves, Sampling(width=64, height=48)).perform(seed=0)
+    assert attempt.label == "valid"
+    assert attempt.recording is not None
+    assert set(attempt.recording.steps.subtasks) == {text}
+    env.close()
