@@ -8,6 +8,7 @@ from typing import TYPE_CHECKING, Annotated
 
 import typer
 
+from . import export
 from .cache import printable
 from .common import ACHIEVED, NOT_ACHIEVED, Json, errors_told
 from .datasets import merge, publish, split
@@ -194,3 +195,4 @@ def _labels(summary: DatasetSummary) -> Iterator[tuple[str, str]]:
 
 for _command in (publish, merge, split):
     app.command()(_command)
+app.add_typer(export.app, name="export")
