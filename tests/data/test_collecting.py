@@ -22,6 +22,7 @@ from maniagent.data.ledger import attempts_file, key_of, note, parts_of, read_at
 from maniagent.data.lerobot.publish import STAGED
 from maniagent.data.moves import move_to, moves_of
 from maniagent.data.outcome import Outcomes, release_point
+from maniagent.data.sessions import Costs
 from maniagent.data.settings import CollectSettings, checked_settings
 from maniagent.data.summary import summarise, to_markdown
 from maniagent.errors import ManiAgentError, UsageError
@@ -175,10 +176,13 @@ def test_the_figures_count_what_they_say() -> None:
             "w00-000003-a1", label="doubtful", distance=None, truly_valid=True, reason="out of view", interventions=1
         ),
     ]
-    figures = summarise("carrot-on-plate", 4, attempts, 3600.0)
+    figures = summarise(
+        "carrot-on-plate", 4, attempts, Costs(seconds=3600.0, working=7200.0, writing=72.0, encoding=4.0)
+    )
     assert (figures.valid, figures.failed, figures.doubtful, figures.interventions) == (2, 1, 1, 1)
     assert (figures.precision, figures.recall) == (0.5, pytest.approx(1 / 3))
     assert (figures.within_paper_threshold, figures.per_hour) == (3, 2.0)
+    assert (figures.writing_share, figures.encoding_seconds) == (0.01, 2.0)
     assert "| 1 | too far |" in to_markdown(figures)
 
 

@@ -31,7 +31,7 @@ class Scribe(Writer):
 
     def append(
         self, dataset: Path, schema: Mapping[str, Any], episodes: Sequence[tuple[Path, str]], codec: str = ""
-    ) -> None:
+    ) -> float:
         (dataset / "meta").mkdir(parents=True, exist_ok=True)
         path = dataset / "meta" / "info.json"
         info = json.loads(path.read_text()) if path.exists() else {**schema, "total_episodes": 0}
@@ -40,6 +40,7 @@ class Scribe(Writer):
         if self.raises is not None:
             raise self.raises
         self.batches.append([folder.name for folder, _ in episodes])
+        return 0.5
 
 
 def keys(collection: Path) -> list[str]:
@@ -58,7 +59,7 @@ def test_episodes_are_published_in_the_order_of_their_keys_and_leave_their_folde
     done = publish(collection, writer=scribe, batch=2, watcher=told.append)
     assert scribe.batches == [["e0", "e1"], ["e2"]]
     assert keys(collection) == ["e0", "e1", "e2"]
-    assert done == Published(collection / "dataset", added=3, total=3)
+    assert done == Published(collection / "dataset", added=3, total=3, processor_seconds=1.0)
     assert [so_far.total for so_far in told] == [2, 3]
     assert list((collection / "episodes").glob("*/episode.json")) == []
 
@@ -66,7 +67,7 @@ def test_episodes_are_published_in_the_order_of_their_keys_and_leave_their_folde
 def test_publishing_again_adds_what_is_new(collection: Path) -> None:
     publish(collection, writer=Scribe())
     stage(collection / "episodes", "a-late-one")
-    assert publish(collection, writer=Scribe()) == Published(collection / "dataset", added=1, total=4)
+    assert publish(collection, writer=Scribe()) == Published(collection / "dataset", added=1, total=4, processor_seconds=0.5)
     assert keys(collection) == ["e0", "e1", "e2", "a-late-one"]
 
 

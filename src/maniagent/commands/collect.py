@@ -3,6 +3,7 @@
 from __future__ import annotations
 
 import math
+from contextlib import nullcontext
 from pathlib import Path
 from typing import TYPE_CHECKING, Annotated
 
@@ -60,6 +61,16 @@ def collect(
     cache: Annotated[
         Path | None, typer.Option(help="Action sequences that worked (docs/cache.md) are taken from here first.")
     ] = None,
+    when_stuck: Annotated[
+        str,
+        typer.Option(
+            help="Where the robot can't get hold of an object any more: put (simulation puts it back), ask, stop."
+        ),
+    ] = "put",
+    ray: Annotated[
+        str | None, typer.Option(metavar="ADDRESS", help="Let the workers run on this Ray cluster (extra `ray`).")
+    ] = None,
+    batch: Annotated[int, typer.Option(min=1, help="Episodes that go into the dataset at a time.")] = 25,
     stage_only: Annotated[
         bool,
         typer.Option("--stage-only", help="Leave the episodes staged, for `maniagent data publish`."),
@@ -90,6 +101,7 @@ def collect(
     """
     with errors_told(as_json):
         from ..data.collector import collect as collected
+        from ..data.helping import helper_for
         from ..data.lerobot import Writer
         from ..data.progress import CollectProgress
         from ..data.settings import checked_settings, phrases_in, read_calls
@@ -115,12 +127,12 @@ def collect(
             attempts=attempts,
             sampling=Sampling(rate=fps, width=width, height=height, depth=depth),
         )
-        if stage_only:
-            with CollectProgress() as progress:
-                summary = collected(settings, out, progress, None)
-        else:
-            with Writer(lerobot_python) as writer, CollectProgress() as progress:
-                summary = collected(settings, out, progress, writer)
+        with (
+            nullcontext() if stage_only else Writer(lerobot_python) as writer,
+            CollectProgress() as progress,
+        ):
+            helper = helper_for(when_stuck, progress.paused)
+            summary = collected(settings, out, progress, writer, helper=helper, ray=ray, batch=batch)
         _tell(summary, as_json)
 
 

@@ -2,28 +2,33 @@
 
 from __future__ import annotations
 
-import time
-from collections.abc import Sequence
+from collections.abc import Callable, Sequence
 from concurrent.futures import Future, ThreadPoolExecutor
 from pathlib import Path
-from typing import Protocol
+from typing import Protocol, Self
 
 from ..envs.cameras import MAIN_CAMERA
 from ..perception.viewpoint import Viewpoint
+from .cluster import RayCluster
 from .coverage import Tried, draw_coverage
 from .crew import Crew
 from .episode import EpisodeInfo
 from .ledger import parts_of, read_attempts
 from .lerobot.client import Writer
 from .lerobot.publish import STAGED, Published, publish
+from .local import ThisMachine
+from .sessions import Session, read_costs
 from .settings import CollectSettings
+from .share import Asked
 from .staging import Staging
 from .starts import Start
-from .station import region_of
-from .summary import Summary, note_session, seconds_spent, summarise, to_markdown
+from .summary import Summary, summarise, to_markdown
+from .table import Table
 
 BATCH = 25
 """Episodes that go into the dataset at a time."""
+MOST_WAITING = 8
+"""Batches that may wait for the dataset before workers have to; at the defaults an episode takes 65 MB until then."""
 _PATIENCE = 0.5
 """s between looks at what the writer does."""
 
@@ -44,29 +49,52 @@ class Watcher(Protocol):
         ...
 
 
-def collect(settings: CollectSettings, folder: Path, watcher: Watcher, writer: Writer | None) -> Summary:
+Helper = Callable[[str], None]
+"""Is told why the robot needs somebody to put things back, and returns once that is done; raises to end it all."""
+
+
+def collect(
+    settings: CollectSettings,
+    folder: Path,
+    watcher: Watcher,
+    writer: Writer | None,
+    *,
+    helper: Helper = lambda why: None,
+    ray: str | None = None,
+    batch: int = BATCH,
+) -> Summary:
     """Collect until there are as many valid episodes as wanted; an earlier, interrupted call is gone on with.
 
-    Without `writer` episodes stay staged. At any moment everything may be killed: what was kept stays, and at most
-    the episode in progress is lost.
+    Without `writer` episodes stay staged, else every `batch` of them goes into the dataset. In simulation the station
+    puts things back by itself, as soon as `helper` returns. `ray` is the address of a cluster whose nodes work. At any
+    moment everything may be killed: what was kept stays, and at most the episodes in progress are lost.
 
     Raises UsageError for a folder that holds something else, SetupError where nothing can be kept or no worker gets
-    anywhere, WriterFailure where lerobot fails.
+    anywhere, WriterFailure where lerobot fails, whatever `helper` raises.
     """
     settings.save(folder)
     Staging(folder / STAGED).sweep()
-    began = time.monotonic()
     try:
         watcher.begin(settings.count, read_attempts(folder))
-        with Crew(settings, folder) as crew, _Publisher(folder, writer, watcher) as publisher:
+        session = Session(folder, settings.workers)
+        with (
+            RayCluster(settings, folder, ray) if ray is not None else ThisMachine(settings, folder) as place,
+            Crew(place, settings.workers, folder) as crew,
+            _Publisher(folder, writer, batch, watcher, session) as publisher,
+        ):
             while crew.busy:
-                for info in crew.hear(_PATIENCE):
-                    watcher.add(info)
-                    publisher.add(info)
+                for said in crew.hear(_PATIENCE):
+                    if isinstance(said, Asked):
+                        helper(said.why)
+                        continue
+                    watcher.add(said.info)
+                    session.add(writing=said.seconds)
+                    publisher.add(said.info)
                 publisher.check()
+                if not publisher.behind:
+                    crew.go_on()
             publisher.finish()
     finally:
-        note_session(folder, time.monotonic() - began)
         summary = write_summary(settings, folder)
     return summary
 
@@ -74,17 +102,18 @@ def collect(settings: CollectSettings, folder: Path, watcher: Watcher, writer: W
 def write_summary(settings: CollectSettings, folder: Path) -> Summary:
     """Figures and maps of what there is."""
     attempts = read_attempts(folder)
-    summary = summarise(settings.task, settings.count, attempts, seconds_spent(folder))
+    summary = summarise(settings.task, settings.count, attempts, read_costs(folder))
     (folder / "summary.json").write_text(summary.model_dump_json(indent=2) + "\n", encoding="utf-8")
     (folder / "summary.md").write_text(to_markdown(summary), encoding="utf-8")
     viewpoint = Viewpoint.from_camera(MAIN_CAMERA.T_base_camera)
     for worker in range(settings.workers):
         mine = [info for info in attempts if parts_of(info.key)[0] == worker]
-        if mine:
+        table = Table.load(folder, worker)
+        if mine and table is not None:
             planned = {info.start: Start(parts_of(info.key)[1], info.start[:2], info.start[2]) for info in mine}
             tried = [Tried.of(info, info.began) for info in mine]
             draw_coverage(
-                region_of(settings, folder, worker),
+                table.region(settings),
                 list(planned.values()),
                 tried,
                 viewpoint,
@@ -96,17 +125,23 @@ def write_summary(settings: CollectSettings, folder: Path) -> Summary:
 class _Publisher:
     """Puts episodes into the dataset while the workers go on; one batch at a time, in a thread of its own."""
 
-    def __init__(self, folder: Path, writer: Writer | None, watcher: Watcher) -> None:
-        self._folder, self._writer, self._watcher = folder, writer, watcher
+    def __init__(self, folder: Path, writer: Writer | None, batch: int, watcher: Watcher, session: Session) -> None:
+        self._folder, self._writer, self._batch = folder, writer, batch
+        self._watcher, self._session = watcher, session
         self._thread = ThreadPoolExecutor(max_workers=1)
         self._running: Future[Published] | None = None
-        self._waiting = 0
+        self._waiting = len(Staging(folder / STAGED).episodes())
 
-    def __enter__(self) -> _Publisher:
+    def __enter__(self) -> Self:
         return self
 
     def __exit__(self, *ending: object) -> None:
         self._thread.shutdown()
+
+    @property
+    def behind(self) -> bool:
+        """Whether so much waits for the dataset that the disk should not have to hold more."""
+        return self._writer is not None and self._waiting > MOST_WAITING * self._batch
 
     def add(self, info: EpisodeInfo) -> None:
         """Count what waits."""
@@ -115,16 +150,20 @@ class _Publisher:
     def check(self) -> None:
         """Begin with a batch where one waits and the last one is done. Raises what that one failed by."""
         if self._running is not None and self._running.done():
-            self._watcher.published(self._running.result())
-            self._running = None
-        if self._running is None and self._writer is not None and self._waiting >= BATCH:
-            self._waiting = 0
-            self._running = self._thread.submit(publish, self._folder, writer=self._writer, batch=BATCH)
+            self._take(self._running)
+        if self._running is None and self._writer is not None and self._waiting >= self._batch:
+            self._running = self._thread.submit(publish, self._folder, writer=self._writer, batch=self._batch)
 
     def finish(self) -> None:
         """Put in all that is left."""
         if self._running is not None:
-            self._running.result()
-            self._running = None
+            self._take(self._running)
         if self._writer is not None:
-            self._watcher.published(publish(self._folder, writer=self._writer, batch=BATCH))
+            self._take(self._thread.submit(publish, self._folder, writer=self._writer, batch=self._batch))
+
+    def _take(self, running: Future[Published]) -> None:
+        published = running.result()
+        self._running = None
+        self._waiting -= published.added
+        self._session.add(encoding=published.processor_seconds)
+        self._watcher.published(published)

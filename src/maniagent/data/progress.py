@@ -4,7 +4,8 @@ from __future__ import annotations
 
 import time
 from collections import Counter
-from collections.abc import Callable, Sequence
+from collections.abc import Callable, Iterator, Sequence
+from contextlib import contextmanager
 from datetime import timedelta
 from types import TracebackType
 from typing import Self
@@ -48,6 +49,13 @@ class CollectProgress:
         if kind is not None and self._labels["valid"] < self._wanted:
             kept = f"{self._labels['valid']} of {self._wanted} episodes are kept; the same command goes on from there."
             self._console.print(Text(kept, style="yellow"), soft_wrap=True)
+
+    @contextmanager
+    def paused(self) -> Iterator[Console]:
+        """The console without the bar, for a talk with a person."""
+        self._bar.stop()
+        yield self._console
+        self._bar.start()
 
     def begin(self, wanted: int, before: Sequence[EpisodeInfo]) -> None:
         """See Watcher."""

@@ -1,77 +1,104 @@
-"""A worker's share of a collection: start after start, until its quota of valid episodes is reached."""
+"""A worker's share of a collection: start after start, until its quota of valid episodes is reached.
+
+It tells what comes of it and goes on when it is asked for more; where it runs, and onto which disk that is written, is
+no matter to it.
+"""
 
 from __future__ import annotations
 
 import time
-from collections.abc import Callable
-from pathlib import Path
+from collections.abc import Iterator, Sequence
+from dataclasses import dataclass
 
+from ..errors import SetupError
 from .chain import Attempt, Stuck
-from .episode import EpisodeInfo
-from .ledger import key_of, note, parts_of, read_attempts
-from .lerobot.publish import STAGED
+from .episode import EpisodeInfo, Recording
+from .ledger import key_of, parts_of
 from .settings import CollectSettings
-from .staging import Staging
 from .starts import Start
 from .station import TwinStation
+from .table import Table
 
 MOST_REFUSALS = 5
 """Starts in a row that can't be had, before a person is asked: then it is where the object lies that is at fault."""
 MOST_INTERVENTIONS = 5
 """In a row, before a worker gives up: then it isn't the scene that is at fault."""
+MOST_FAILURES = 50
+"""Attempts in a row without a valid one, before a worker gives up: something is broken, or can't be done."""
+
+
+@dataclass(frozen=True)
+class Tried:
+    """One attempt, to be kept."""
+
+    info: EpisodeInfo
+    recording: Recording | None
+
+
+@dataclass(frozen=True)
+class Asked:
+    """The robot can't go on until somebody has put things back; asking it for more says that this is done."""
+
+    why: str
+
+
+Said = Table | Tried | Asked
 
 
 class Share:
-    """Collects one worker's episodes."""
+    """What one worker does. The sessions of a collection that was cut off do it together."""
 
     def __init__(
-        self, settings: CollectSettings, worker: int, folder: Path, tell: Callable[[EpisodeInfo], None]
+        self, settings: CollectSettings, worker: int, before: Sequence[EpisodeInfo] = (), table: Table | None = None
     ) -> None:
-        """`tell` hears of every attempt, once it is on the disk."""
-        self._settings, self._worker, self._folder, self._tell = settings, worker, folder, tell
-        self._staging = Staging(folder / STAGED, keep_failed=False)
-        self._refusals = self._interventions = 0
+        """`before`: every attempt that earlier sessions have noted, of whichever worker; `table`: what they saw."""
+        self._settings, self._worker, self._table = settings, worker, table
+        mine = [info for info in before if parts_of(info.key)[0] == worker]
+        self._missing = settings.quota(worker) - sum(info.label == "valid" for info in mine)
+        self._first = max((parts_of(info.key)[1] for info in mine), default=-1) + 1
+        self._refusals = self._interventions = self._failures = 0
 
-    def collect(self) -> None:
+    def work(self) -> Iterator[Said]:
         """Go on until the quota is reached.
 
-        Raises Stuck where help doesn't help, SetupError and UsageError where episodes can't be kept.
+        Raises Stuck where help doesn't help, SetupError where attempt after attempt fails, StageFailure where the table
+        doesn't hold what the task is about.
         """
-        mine = [info for info in read_attempts(self._folder) if parts_of(info.key)[0] == self._worker]
-        valid = sum(info.label == "valid" for info in mine)
-        first = max((parts_of(info.key)[1] for info in mine), default=-1) + 1
-        quota = self._settings.quota(self._worker)
-        if valid >= quota:
+        if self._missing <= 0:
             return
-        with TwinStation(self._settings, self._worker, self._folder) as station:
-            for start in station.starts(first):
-                valid += self._at(station, start)
-                if valid >= quota:
+        with TwinStation(self._settings, self._worker, self._table) as station:
+            if self._table is None:
+                yield station.table
+            for start in station.starts(self._first):
+                for said in self._try_at(station, start):
+                    yield said
+                    if isinstance(said, Tried):
+                        self._count(said.info)
+                if self._missing <= 0:
                     return
 
-    def _at(self, station: TwinStation, start: Start) -> bool:
-        """Try at one start until an episode is valid; whether one was."""
+    def _try_at(self, station: TwinStation, start: Start) -> Iterator[Tried | Asked]:
+        """Try at one start until an episode is valid."""
         for number in range(1, self._settings.attempts + 1):
-            began = time.monotonic()
-            interventions = 0
+            began, interventions = time.monotonic(), 0
             try:
                 why = self._bring(station, start)
             except Stuck as stuck:
                 self._interventions += 1
                 if self._interventions > MOST_INTERVENTIONS:
                     raise
-                interventions, why = 1, str(stuck)
+                yield Asked(str(stuck))
                 station.put(start)
+                why, interventions = "", 1
             else:
                 self._interventions = 0
-            if why and not interventions:
-                self._keep(station, start, number, Attempt("failed", why, None, None), began, interventions)
-                return False
-            attempt = station.chain.perform(seed=start.index)
-            self._keep(station, start, number, attempt, began, interventions)
-            if attempt.label == "valid":
-                return True
-        return False
+            attempt = Attempt("failed", why, None, None) if why else station.chain.perform(seed=start.index)
+            info = self._info(station, start, number, attempt)
+            seconds = time.monotonic() - began
+            update = {"seconds": seconds, "interventions": interventions}
+            yield Tried(info.model_copy(update=update), attempt.recording)
+            if why or attempt.label == "valid":
+                return
 
     def _bring(self, station: TwinStation, start: Start) -> str:
         if self._settings.reset == "teleport":
@@ -84,11 +111,18 @@ class Share:
             raise Stuck(why)
         return why
 
-    def _keep(
-        self, station: TwinStation, start: Start, number: int, attempt: Attempt, began: float, interventions: int
-    ) -> None:
+    def _count(self, info: EpisodeInfo) -> None:
+        if info.label == "valid":
+            self._missing -= 1
+            self._failures = 0
+            return
+        self._failures += 1
+        if self._failures >= MOST_FAILURES:
+            raise SetupError(f"{MOST_FAILURES} attempts in a row came to nothing; the last: {info.reason}")
+
+    def _info(self, station: TwinStation, start: Start, number: int, attempt: Attempt) -> EpisodeInfo:
         true_distance, truly_valid = station.truth()
-        info = EpisodeInfo(
+        return EpisodeInfo(
             key=key_of(self._worker, start.index, number),
             task=self._settings.task,
             instruction=self._settings.instruction,
@@ -103,11 +137,4 @@ class Share:
             distance=attempt.distance,
             true_distance=true_distance,
             truly_valid=truly_valid,
-            seconds=time.monotonic() - began,
-            interventions=interventions,
         )
-        keep = self._staging.quarantine if attempt.label == "doubtful" else self._staging.commit
-        if attempt.label != "failed":
-            keep(info, attempt.recording)
-        note(self._folder, self._worker, info)
-        self._tell(info)

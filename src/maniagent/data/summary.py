@@ -2,19 +2,18 @@
 
 from __future__ import annotations
 
-import json
+import os
 from collections import Counter
 from collections.abc import Sequence
-from pathlib import Path
 
 from pydantic import BaseModel, ConfigDict
 
 from ..evaluation.statistics import Rate
 from .episode import EpisodeInfo
+from .sessions import Costs
 
 PAPER_THRESHOLD = 0.15
 """m, what the paper counts as success."""
-SESSIONS = "sessions.jsonl"
 
 
 class Summary(BaseModel):
@@ -35,6 +34,12 @@ class Summary(BaseModel):
     """Wall time, all sessions together."""
     per_hour: float | None
     """Valid episodes."""
+    writing_share: float | None
+    """Of the workers' wall time: forcing episodes onto the disk."""
+    encoding_seconds: float
+    """Processor time of the process that writes the dataset, for each valid episode."""
+    encoding_share: float | None
+    """Of the machine's processor time while collecting: the same."""
     precision: float | None
     """Of the label "valid", against the simulator's predicate; None where nobody knows the truth."""
     recall: float | None
@@ -42,9 +47,10 @@ class Summary(BaseModel):
     """Why attempts weren't valid."""
 
 
-def summarise(task: str, wanted: int, attempts: Sequence[EpisodeInfo], seconds: float) -> Summary:
+def summarise(task: str, wanted: int, attempts: Sequence[EpisodeInfo], costs: Costs) -> Summary:
     """The figures."""
     labels = Counter(info.label for info in attempts)
+    cores = os.cpu_count() or 1
     known = [info for info in attempts if info.truly_valid is not None]
     both = sum(info.label == "valid" and bool(info.truly_valid) for info in known)
     said, true = sum(info.label == "valid" for info in known), sum(bool(info.truly_valid) for info in known)
@@ -57,8 +63,11 @@ def summarise(task: str, wanted: int, attempts: Sequence[EpisodeInfo], seconds: 
         doubtful=labels["doubtful"],
         within_paper_threshold=sum(i.distance is not None and i.distance <= PAPER_THRESHOLD for i in attempts),
         interventions=sum(info.interventions for info in attempts),
-        seconds=round(seconds, 1),
-        per_hour=round(3600 * labels["valid"] / seconds, 1) if seconds > 0 else None,
+        seconds=round(costs.seconds, 1),
+        per_hour=round(3600 * labels["valid"] / costs.seconds, 1) if costs.seconds > 0 else None,
+        writing_share=round(costs.writing / costs.working, 4) if costs.working > 0 else None,
+        encoding_seconds=round(costs.encoding / labels["valid"], 3) if labels["valid"] else 0.0,
+        encoding_share=round(costs.encoding / (costs.seconds * cores), 4) if costs.seconds > 0 else None,
         precision=both / said if said else None,
         recall=both / true if true else None,
         reasons=dict(Counter(info.reason for info in attempts if info.label != "valid").most_common(20)),
@@ -79,9 +88,18 @@ def rows(summary: Summary) -> list[tuple[str, str]]:
         ("interventions", str(summary.interventions)),
         ("wall time", f"{summary.seconds:.0f} s"),
         ("valid episodes an hour", "–" if summary.per_hour is None else f"{summary.per_hour:.0f}"),
-        ("precision of the label", "–" if summary.precision is None else f"{100 * summary.precision:.1f} %"),
-        ("recall of the label", "–" if summary.recall is None else f"{100 * summary.recall:.1f} %"),
+        ("writing episodes", f"{_percent(summary.writing_share)} of the workers' time"),
+        (
+            "encoding the dataset",
+            f"{summary.encoding_seconds:.1f} s of a core each, {_percent(summary.encoding_share)} of the machine's",
+        ),
+        ("precision of the label", _percent(summary.precision)),
+        ("recall of the label", _percent(summary.recall)),
     ]
+
+
+def _percent(share: float | None) -> str:
+    return "–" if share is None else f"{100 * share:.1f} %"
 
 
 def to_markdown(summary: Summary) -> str:
@@ -92,17 +110,3 @@ def to_markdown(summary: Summary) -> str:
         lines += ["", "## Why attempts weren't valid", "", "| times | reason |", "| --- | --- |"]
         lines += [f"| {count} | {' '.join(reason.split())} |" for reason, count in summary.reasons.items()]
     return "\n".join(lines) + "\n"
-
-
-def note_session(folder: Path, seconds: float) -> None:
-    """Add the wall time of one call."""
-    with (folder / SESSIONS).open("a", encoding="utf-8") as file:
-        file.write(json.dumps({"seconds": round(seconds, 3)}) + "\n")
-
-
-def seconds_spent(folder: Path) -> float:
-    """Wall time of the calls that came to an end; of one that was killed nobody knows."""
-    path = folder / SESSIONS
-    if not path.exists():
-        return 0.0
-    return sum(float(json.loads(line)["seconds"]) for line in path.read_text().splitlines() if line.endswith("}"))

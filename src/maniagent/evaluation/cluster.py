@@ -6,7 +6,7 @@ from collections import deque
 from collections.abc import Generator, Sequence
 from typing import Any
 
-from ..errors import ManiAgentError, SetupError
+from ..cluster import Cluster
 from .episode import CRASH, EpisodeResult, Job, lost
 from .play import Play
 from .workers import LocalExecutor
@@ -21,21 +21,13 @@ class RayExecutor:
     """
 
     def __init__(self, play: Play, workers: int, time_limit: float, address: str) -> None:
-        """Connect; `address` is as Ray's: "auto", "ray://host:port", "host:port", or "local" for a cluster of its own.
-
-        Raises SetupError where Ray isn't installed or doesn't answer.
-        """
+        """Connect; `address` as for Cluster. Raises SetupError where none answers."""
         self._play, self._workers, self._time_limit = play, workers, time_limit
-        self._ray = _import_ray()
-        self._connected = not self._ray.is_initialized()  # else the caller's connection is used, and left alone
-        try:
-            self._ray.init(address=address, log_to_driver=False, logging_level="error", ignore_reinit_error=True)
-        except (ConnectionError, ValueError, RuntimeError) as error:
-            raise SetupError(f"No Ray cluster answers at {address!r}: {error}") from error
+        self._cluster = Cluster(address)
 
     def run(self, jobs: Sequence[Job]) -> Generator[EpisodeResult, None, None]:
         """See Executor."""
-        ray, waiting = self._ray, deque(jobs)
+        ray, waiting = self._cluster.ray, deque(jobs)
         remote = ray.remote(num_cpus=1, max_retries=0)(_play_on_node)
         running: dict[Any, Job] = {}
         try:
@@ -49,18 +41,16 @@ class RayExecutor:
         finally:
             for reference in running:
                 ray.cancel(reference, force=True)
-            if self._connected:
-                ray.shutdown()
+            self._cluster.close()
 
     def _result(self, reference: Any, job: Job) -> EpisodeResult:
         """What came of a job; raises on what the episode raised on purpose."""
+        ray = self._cluster.ray
         try:
-            result: EpisodeResult = self._ray.get(reference)
-        except self._ray.exceptions.RayTaskError as error:
-            if isinstance(error.cause, ManiAgentError):
-                raise error.cause from None
-            raise SetupError(f"A node can't play episodes (is the same maniagent installed there?): {error}") from error
-        except self._ray.exceptions.RayError as error:
+            result: EpisodeResult = ray.get(reference)
+        except ray.exceptions.RayTaskError as error:
+            raise self._cluster.cause(error) from error
+        except ray.exceptions.RayError as error:
             return lost(job, CRASH, f"Ray lost the episode: {type(error).__name__}: {error}")
         return result
 
@@ -68,11 +58,3 @@ class RayExecutor:
 def _play_on_node(play: Play, job: Job, time_limit: float) -> EpisodeResult:
     (result,) = LocalExecutor(play, 1, time_limit).run([job])
     return result
-
-
-def _import_ray() -> Any:
-    try:
-        import ray
-    except ImportError:
-        raise SetupError("Evaluating on a cluster takes Ray: pip install 'maniagent[ray]'") from None
-    return ray

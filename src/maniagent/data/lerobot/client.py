@@ -17,6 +17,7 @@ from types import TracebackType
 from typing import IO, Any, Self
 
 from ...errors import ManiAgentError, SetupError
+from ..disk import FULL
 from .interpreter import HOW, find_interpreter
 
 SCRIPT = Path(__file__).with_name("writer.py")
@@ -45,6 +46,7 @@ class Writer:
         self._scratch: tempfile.TemporaryDirectory[str] | None = None
         self._said: IO[bytes] | None = None
         self._unread = b""
+        self._processor_seconds = 0.0
 
     def __enter__(self) -> Self:
         return self
@@ -54,14 +56,35 @@ class Writer:
     ) -> None:
         self.close()
 
+    def check(self) -> None:
+        """Raises SetupError where its Python has no lerobot: told in a tenth of a second, not after an hour."""
+        asks = "import importlib.util, sys; sys.exit(importlib.util.find_spec('lerobot') is None)"
+        try:
+            there = subprocess.run([self._python, "-c", asks], capture_output=True, check=False).returncode == 0  # noqa: S603
+        except OSError as error:
+            raise SetupError(f"{self._python} doesn't start ({error.strerror}). {HOW}") from error
+        if not there:
+            raise SetupError(f"{self._python} has no lerobot. {HOW}")
+
+    def interrupt(self) -> None:
+        """Let the request that is served fail at once; may be called while another thread waits for it."""
+        process = self._process
+        if process is not None:
+            process.kill()
+
     def append(
         self, dataset: Path, schema: Mapping[str, Any], episodes: Sequence[tuple[Path, str]], codec: str = CODEC
-    ) -> None:
-        """Add staged episodes, each a folder and the task that LeRobot is told, to a dataset that nobody reads."""
+    ) -> float:
+        """Add staged episodes, each a folder and the task that LeRobot is told, to a dataset that nobody reads.
+
+        Returns the processor time (s) that it took, the start of the process included where this was its first.
+        """
         plain = [{"folder": str(folder.absolute()), "task": task} for folder, task in episodes]
-        self._ask(
+        answer = self._ask(
             {"do": "append", "dataset": str(dataset.absolute()), "schema": schema, "codec": codec, "episodes": plain}
         )
+        before, self._processor_seconds = self._processor_seconds, float(answer["processor_seconds"])
+        return self._processor_seconds - before
 
     def merge(self, datasets: Sequence[Path], out: Path) -> None:
         """Make the dataset `out`, which must not be there, of several."""
@@ -75,6 +98,7 @@ class Writer:
     def close(self) -> None:
         """End the process, and remove what lerobot left in its caches."""
         process, self._process, self._unread = self._process, None, b""
+        self._processor_seconds = 0.0
         if process is not None:
             process.kill()  # nothing that it was not asked to finish is worth waiting for
             process.wait()
@@ -151,10 +175,9 @@ def _unwrap(answer: Mapping[str, Any]) -> dict[str, Any]:
         return held
     error = answer["error"]
     # An encoder's thread hands its error on as text; the number is lost.
-    full = os.strerror(errno.ENOSPC)
-    if error["errno"] == errno.ENOSPC or full in error["message"]:
+    if error["errno"] in FULL or any(os.strerror(number) in error["message"] for number in FULL):
         raise SetupError(f"The disk is full ({error['message']}). Make room and run this again; nothing is lost.")
-    if error["errno"] in (errno.EACCES, errno.EROFS, errno.EPERM, errno.EDQUOT):
+    if error["errno"] in (errno.EACCES, errno.EROFS, errno.EPERM):
         raise SetupError(f"The dataset can't be written ({error['message']}). Allow it and run this again.")
     raise WriterFailure(f"lerobot refused ({error['kind']}: {error['message']}); the dataset is as it was.")
 

@@ -2,7 +2,6 @@
 
 from __future__ import annotations
 
-import errno
 import hashlib
 import shutil
 from collections.abc import Callable, Sequence
@@ -10,15 +9,15 @@ from dataclasses import dataclass
 from pathlib import Path
 from typing import Any
 
-from pydantic import ValidationError
-
 from ...errors import SetupError, UsageError
+from ...robots.sampling import Sampling
+from ..disk import FULL
 from ..episode import EpisodeInfo
-from ..staging import INFO, Staging
+from ..staging import Staging, read_info
 from .client import CODEC, Writer
 from .generation import locked, next_generation, recover
 from .ledger import read_ledger, write_ledger
-from .schema import ROBOT, differences, read_schema, schema_of
+from .schema import ROBOT, check_rate, differences, read_schema, schema_of, unlike
 
 STAGED, DATASET = "episodes", "dataset"
 """Folders of a collection."""
@@ -33,6 +32,8 @@ class Published:
     """Episodes that are new in the dataset."""
     total: int
     """Episodes in it now."""
+    processor_seconds: float = 0.0
+    """What adding them took the writer."""
 
 
 @dataclass(frozen=True)
@@ -75,19 +76,38 @@ def publish(
             _remove_published(collection, present)
             staged = _staged(collection)
             schema = _common_schema(dataset, staged, robot_type)
-            added = 0
+            added, spent = 0, 0.0
             for start in range(0, len(staged), batch):
                 some = staged[start : start + batch]
                 present = [*present, *(episode.info for episode in some)]
                 with next_generation(dataset) as new:
-                    writer.append(new, schema, [(episode.folder, phrase(episode.info)) for episode in some], codec)
+                    told = [(episode.folder, phrase(episode.info)) for episode in some]
+                    spent += writer.append(new, schema, told, codec)
                     write_ledger(new, present)
                 added += len(some)
                 _remove_published(collection, present)
-                watcher(Published(dataset, added, len(present)))
-            return Published(dataset, added, len(present))
+                watcher(Published(dataset, added, len(present), spent))
+            return Published(dataset, added, len(present), spent)
     except OSError as error:
         raise disk_error(error, collection) from error
+
+
+def check_dataset(collection: Path, sampling: Sampling, *, robot_type: str = ROBOT, wait: float = 10.0) -> None:
+    """See, before anything is collected, whether episodes that are sampled so can go into a collection's dataset.
+
+    What killed processes left of it is mended first. Raises as `publish` does.
+    """
+    dataset = collection / DATASET
+    try:
+        with locked(collection, wait):
+            recover(dataset)
+            _remove_published(collection, _present(dataset))
+            _common_schema(dataset, _staged(collection), robot_type)
+    except OSError as error:
+        raise disk_error(error, collection) from error
+    check_rate(sampling.rate)
+    if dataset.exists() and (found := unlike(read_schema(dataset), sampling, robot_type)):
+        raise UsageError(f"{dataset} is of another kind: {'; '.join(found)}. Collect into another folder.")
 
 
 def phrase(info: EpisodeInfo) -> str:
@@ -98,7 +118,7 @@ def phrase(info: EpisodeInfo) -> str:
 
 def disk_error(error: OSError, folder: Path) -> SetupError:
     """What to say of a disk that is full, or that may not be written to."""
-    if error.errno in (errno.ENOSPC, errno.EDQUOT):
+    if error.errno in FULL:
         return SetupError(f"The disk of {folder} is full. Make room and run this again; nothing is lost.")
     return SetupError(f"{folder} can't be worked in ({error}). Allow it and run this again; nothing is lost.")
 
@@ -118,10 +138,7 @@ def _present(dataset: Path) -> list[EpisodeInfo]:
 def _staged(collection: Path) -> list[_Staged]:
     found = []
     for folder in Staging(collection / STAGED).episodes():
-        try:
-            info = EpisodeInfo.model_validate_json((folder / INFO).read_bytes())
-        except ValidationError as error:
-            raise UsageError(f"{folder / INFO} can't be read: {error}. Move the episode out of the folder.") from error
+        info = read_info(folder)
         if info.label == "valid":
             found.append(_Staged(folder, info))
     return found
@@ -142,6 +159,8 @@ def _common_schema(dataset: Path, staged: Sequence[_Staged], robot_type: str) ->
 
 def _remove_published(collection: Path, present: Sequence[EpisodeInfo]) -> None:
     """Remove the staged folders of episodes that are in the dataset; one that can be seen is whole until the end."""
+    for gone in (collection / STAGED).glob(".*.published/"):  # by one that was killed meanwhile
+        shutil.rmtree(gone)
     for info in present:
         folder = collection / STAGED / info.key
         if folder.exists():

@@ -11,6 +11,7 @@ from typing import Any
 import numpy as np
 
 from ...errors import UsageError
+from ...robots.sampling import Sampling
 from ..episode import JOINTS, EpisodeInfo
 
 ROBOT = "widowx_250s"
@@ -39,8 +40,7 @@ def schema_of(folder: Path, info: EpisodeInfo, robot_type: str = ROBOT) -> Schem
     Only its images' headers are read. Raises UsageError where its rate isn't a whole number of frames a second, which
     LeRobot's videos can't have, or where an image file can't be read.
     """
-    if info.fps != round(info.fps):
-        raise UsageError(f"{folder}: LeRobot's videos have a whole number of frames a second, not {info.fps:g}.")
+    check_rate(info.fps)
     features: dict[str, Feature] = {
         "observation.state": _numbers(_STATE),
         "observation.ee_pose": _numbers(("x", "y", "z", "qx", "qy", "qz", "qw")),
@@ -71,6 +71,28 @@ def read_schema(dataset: Path) -> Schema:
         raise UsageError(
             f"{path} is no description of a LeRobot dataset ({error}). Publish into another folder."
         ) from error
+
+
+def check_rate(fps: float) -> None:
+    """Raises UsageError for a rate that LeRobot's videos can't have."""
+    if fps != round(fps):
+        raise UsageError(f"LeRobot's videos have a whole number of frames a second, not {fps:g}; say another --fps.")
+
+
+def unlike(have: Schema, sampling: Sampling, robot_type: str = ROBOT) -> list[str]:
+    """In what episodes sampled so will differ from those of a dataset, as far as that is known before there is one."""
+    found = []
+    if have.fps != sampling.rate:
+        found.append(f"{have.fps} frames a second, not {sampling.rate:g}")
+    if have.robot_type != robot_type:
+        found.append(f"robot {have.robot_type}, not {robot_type}")
+    for name, feature in have.features.items():
+        height, width = feature["shape"][:2] if feature["dtype"] in ("video", "image") else (None, None)
+        if height is not None and (height, width) != (sampling.height, sampling.width):
+            found.append(f"{name} has {width} x {height} px, not {sampling.width} x {sampling.height}")
+    if any(name.startswith("depth.") for name in have.features) != sampling.depth:
+        found.append("no depth" if sampling.depth else "depth")
+    return found
 
 
 def differences(have: Schema, want: Schema) -> list[str]:

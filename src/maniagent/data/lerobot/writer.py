@@ -22,6 +22,7 @@ import os
 import queue
 import sys
 import threading
+import time
 from collections.abc import Callable
 from pathlib import Path
 from typing import Any
@@ -35,7 +36,9 @@ Array = NDArray[Any]
 
 
 def append(dataset: str, schema: dict[str, Any], codec: str, episodes: list[dict[str, str]]) -> dict[str, Any]:
-    """Add the staged episodes to the dataset, which is made where there is none; returns how much was added.
+    """Add the staged episodes to the dataset, which is made where there is none.
+
+    Returns how much was added, and the processor time (s) that this process has taken since it began.
 
     Nothing in `dataset` may be read before this returns: parquet files have no footer until then. Files that are
     there are never written to, but for those directly in meta/.
@@ -61,7 +64,7 @@ def append(dataset: str, schema: dict[str, Any], codec: str, episodes: list[dict
         )
     frames = sum(_append_one(data, Path(episode["folder"]), episode["task"]) for episode in episodes)
     data.finalize()
-    return {"episodes": len(episodes), "frames": frames}
+    return {"episodes": len(episodes), "frames": frames, "processor_seconds": time.process_time()}
 
 
 def _codec_of(root: Path) -> str | None:
