@@ -46,6 +46,15 @@ class Table(FakeRobot):
         """In the place of `rules_agents`."""
         return Agents("paper", self, ScriptedAgents([]), self, ScriptedAgents([]))
 
+    @property
+    def sought(self) -> str:
+        """The thing that is to be moved now."""
+        return self._located[0].name
+
+    def put(self, name: str, xy: Sequence[float]) -> None:
+        """Lay a thing somewhere."""
+        self.things[name] = _thing(0, name, xy, like=self.things[name])
+
     def at(self, name: str) -> tuple[float, float]:
         """Where a thing lies, to the tenth of a millimetre."""
         x, y = self.things[name].centre[:2]
@@ -77,10 +86,8 @@ class Table(FakeRobot):
         self.while_moving(self)
         place = release_point(keypoints, self._located)
         if place is not None and self.report.completed:
-            moved = self._located[0]
-            name = moved.name
-            self.flat.discard(name)
-            self.things[name] = _thing(0, name, [place[0] + self.off, place[1]], like=self.things[name])
+            self.flat.discard(self.sought)
+            self.put(self.sought, (place[0] + self.off, place[1]))
         return self.report
 
     def on_move(self, hook: Callable[[str, float], None]) -> None:

@@ -2,7 +2,7 @@
 
 from __future__ import annotations
 
-from collections.abc import Iterator
+from collections.abc import Iterator, Sequence
 from typing import Any
 
 import numpy as np
@@ -18,6 +18,7 @@ from maniagent.errors import CameraFailure
 from maniagent.robots.sampling import Sampling
 from maniagent.robots.simulated import SimulatedRobot
 from maniagent.tasks import task_named
+from maniagent.types import KeyPoint
 
 START = Start(0, (0.25, 0.05), 0.3)
 SMALL = Sampling(width=64, height=48)
@@ -211,6 +212,25 @@ def test_what_was_not_moved_stays(table: Table) -> None:
     table.tried.clear()
     both.bring(START)
     assert all("egg" in text for text in table.tried)
+
+
+def test_what_is_in_the_way_home_goes_first(table: Table) -> None:
+    both = chain(table, BOTH)
+    both.perform(seed=0)
+    table.put("egg", PEPPER)  # as though it had rolled to where the pepper has to go
+    table.refuse = lambda keypoints: "It would hit the egg." if blocked(table, keypoints) else ""
+    table.tried.clear()
+    assert both.bring(START) == ""
+    assert [text.split()[2] for text in table.tried] == ["pepper", "pepper", "pepper", "egg", "pepper"]
+    assert table.at("pepper") == pytest.approx(PEPPER, abs=1e-3)
+    assert table.at("egg") == START.xy
+
+
+def blocked(table: Table, keypoints: Sequence[KeyPoint]) -> bool:
+    """Whether something else lies where an object is to be let go."""
+    place = [point.T_base_tcp[:2, 3] for point in keypoints if point.held is not None][-1]
+    held = table.sought
+    return any(np.hypot(*(thing.centre[:2] - place)) < 0.05 for name, thing in table.things.items() if name != held)
 
 
 def test_what_can_not_be_brought_back_takes_a_person_who_puts_all_of_it_back(table: Table) -> None:

@@ -86,25 +86,32 @@ class Chain:
     def bring(self, start: Start) -> str:
         """Put the object at a start; returns why that start can't be had, empty where the object is there.
 
-        Before that everything else that the task moves goes back to where it began, what was moved last first. Raises
-        Stuck where the robot can't get hold of an object at all, wherever it was to go: then a person puts all of them
-        back.
+        Everything else that the task moves goes back to where it began: what was moved last goes first, and once more
+        after the object where that lay in its way. Raises Stuck where the robot can't get hold of an object at all,
+        wherever it was to go: then a person puts all of them back.
         """
         try:
-            for name in reversed(list(self._astray)):
-                self._bring_home(name)
-            return self._bring_to(start)
+            self._bring_home()
+            why = self._bring_to(start)
+            if still_astray := self._bring_home():
+                raise Stuck(still_astray)
         except Stuck:
             self._astray.clear()
             raise
+        return why
 
-    def _bring_home(self, name: str) -> None:
-        home = self._homes[name]
-        x, y = map(float, home.centre[:2])
-        result = self._run((move_to(name, (x, y), home.yaw),), self._settings.bring_attempts)
-        if result.verdict is not RunVerdict.ACHIEVED:
-            raise Stuck(f"The {name} can't be brought back to where it began, ({x:.2f}, {y:.2f}): {result.reason}")
-        del self._astray[name]
+    def _bring_home(self) -> str:
+        """Take home what is astray; returns why that can't be done with the last of those with which it can't."""
+        why = ""
+        for name in reversed(list(self._astray)):
+            home = self._homes[name]
+            x, y = map(float, home.centre[:2])
+            result = self._run((move_to(name, (x, y), home.yaw),), self._settings.bring_attempts)
+            if result.verdict is RunVerdict.ACHIEVED:
+                del self._astray[name]
+            else:
+                why = f"The {name} can't be brought back to where it began, ({x:.2f}, {y:.2f}): {result.reason}"
+        return why
 
     def _bring_to(self, start: Start) -> str:
         carry = (move_to(self.moved, start.xy, start.yaw),)

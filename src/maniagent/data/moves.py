@@ -55,8 +55,8 @@ def check_moves(moves: Sequence[Move]) -> None:
     """Make sure that moves can be collected, as far as that shows before anything is looked at.
 
     Raises UsageError for a name that the lexicon, which finds things while collecting, doesn't understand; for a thing
-    that moves and is told by its place, since every episode begins with it elsewhere; and for what isn't let go, since
-    success is where it lies then.
+    that moves and is told by its place, since every episode begins with it elsewhere, or that can't be brought back by
+    its name; and for what isn't let go, since success is where it lies then.
     """
     vocabulary = Vocabulary.load()
     moved = {move.objects[0] for move in moves}
@@ -70,6 +70,10 @@ def check_moves(moves: Sequence[Move]) -> None:
                 raise UsageError(
                     f"{name!r} is told by its place, and every episode begins with it at another. Name it by its looks."
                 )
+        try:
+            move_to(move.objects[0], (0.3, 0.0))
+        except ReasoningFailure as failure:
+            raise UsageError(f"How {move.objects[0]!r} should be brought back can't be said: {failure}") from failure
         grips = [step.gripper for step in move.sequence.steps]
         if Gripper.CLOSE not in grips or Gripper.OPEN not in grips[grips.index(Gripper.CLOSE) :]:
             raise UsageError(f"{move.text!r} takes nothing anywhere and lets it go, so success can't be measured.")
