@@ -12,10 +12,11 @@ from ..perception.viewpoint import Viewpoint
 from .cluster import RayCluster
 from .coverage import Tried, draw_coverage
 from .crew import Crew
+from .disk import disk_errors_told, write_whole
 from .episode import EpisodeInfo
 from .ledger import parts_of, read_attempts
 from .lerobot.client import Writer
-from .lerobot.publish import STAGED, Published, publish
+from .lerobot.publish import STAGED, Published, check_dataset, publish
 from .local import ThisMachine
 from .sessions import Session, read_costs
 from .settings import CollectSettings
@@ -73,7 +74,7 @@ def collect(
     anywhere, WriterFailure where lerobot fails, whatever `helper` raises.
     """
     settings.save(folder)
-    Staging(folder / STAGED).sweep()
+    _check(settings, folder, writer)
     try:
         watcher.begin(settings.count, read_attempts(folder))
         session = Session(folder, settings.workers)
@@ -99,12 +100,22 @@ def collect(
     return summary
 
 
+def _check(settings: CollectSettings, folder: Path, writer: Writer | None) -> None:
+    """Find what would end the collection before it takes an hour, and mend what a killed one left."""
+    Staging(folder / STAGED).sweep()
+    if writer is not None:
+        writer.check()
+        check_dataset(folder, settings.sampling)
+    for worker in range(settings.workers):
+        Table.load(folder, worker)
+
+
 def write_summary(settings: CollectSettings, folder: Path) -> Summary:
     """Figures and maps of what there is."""
     attempts = read_attempts(folder)
     summary = summarise(settings.task, settings.count, attempts, read_costs(folder))
-    (folder / "summary.json").write_text(summary.model_dump_json(indent=2) + "\n", encoding="utf-8")
-    (folder / "summary.md").write_text(to_markdown(summary), encoding="utf-8")
+    write_whole(folder / "summary.json", summary.model_dump_json(indent=2) + "\n")
+    write_whole(folder / "summary.md", to_markdown(summary))
     viewpoint = Viewpoint.from_camera(MAIN_CAMERA.T_base_camera)
     for worker in range(settings.workers):
         mine = [info for info in attempts if parts_of(info.key)[0] == worker]
@@ -112,13 +123,9 @@ def write_summary(settings: CollectSettings, folder: Path) -> Summary:
         if mine and table is not None:
             planned = {info.start: Start(parts_of(info.key)[1], info.start[:2], info.start[2]) for info in mine}
             tried = [Tried.of(info, info.began) for info in mine]
-            draw_coverage(
-                table.region(settings),
-                list(planned.values()),
-                tried,
-                viewpoint,
-                folder / f"coverage-w{worker:02d}.png",
-            )
+            picture = folder / f"coverage-w{worker:02d}.png"
+            with disk_errors_told(picture):
+                draw_coverage(table.region(settings), list(planned.values()), tried, viewpoint, picture)
     return summary
 
 
@@ -136,6 +143,8 @@ class _Publisher:
         return self
 
     def __exit__(self, *ending: object) -> None:
+        if ending != (None, None, None) and self._writer is not None:
+            self._writer.interrupt()  # what goes into the dataset now stays staged
         self._thread.shutdown()
 
     @property

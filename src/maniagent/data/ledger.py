@@ -2,17 +2,19 @@
 
 from __future__ import annotations
 
-import json
+import os
 import re
 from collections.abc import Iterator
 from pathlib import Path
 
 from pydantic import ValidationError
 
+from ..errors import UsageError
+from .disk import disk_errors_told
 from .episode import EpisodeInfo
 from .lerobot.ledger import read_ledger
 from .lerobot.publish import DATASET, STAGED
-from .staging import INFO, Staging
+from .staging import Staging, read_info
 
 _KEY = re.compile(r"^w(\d+)-(\d+)-a(\d+)$")
 
@@ -37,15 +39,23 @@ def attempts_file(folder: Path, worker: int) -> Path:
 
 
 def note(folder: Path, worker: int, info: EpisodeInfo) -> None:
-    """Write down one attempt."""
-    with attempts_file(folder, worker).open("a", encoding="utf-8") as file:
-        file.write(info.model_dump_json() + "\n")
+    """Write down one attempt.
+
+    Raises SetupError where the disk is full, UsageError where it may not be written to.
+    """
+    path = attempts_file(folder, worker)
+    with disk_errors_told(path), path.open("ab") as file:
+        cut_off = file.tell() > 0 and not _ends_a_line(path)
+        # In one piece: what a kill or a full disk cuts off costs itself, not the next line.
+        file.write(b"\n" * cut_off + info.model_dump_json().encode() + b"\n")
 
 
 def read_attempts(folder: Path) -> tuple[EpisodeInfo, ...]:
     """Every attempt of a collection, by key: those noted, staged, in quarantine, and in the dataset.
 
     A worker that was killed between keeping an episode and noting it has lost nothing: the episode speaks for itself.
+
+    Raises UsageError where something is written that no kill leaves, and that no collection wrote.
     """
     known: dict[str, EpisodeInfo] = {}
     for path in sorted(folder.glob("attempts-w*.jsonl")):
@@ -53,16 +63,36 @@ def read_attempts(folder: Path) -> tuple[EpisodeInfo, ...]:
     if (folder / STAGED).is_dir():
         staging = Staging(folder / STAGED)
         for episode in (*staging.episodes(), *staging.quarantined()):
-            info = EpisodeInfo.model_validate_json((episode / INFO).read_text(encoding="utf-8"))
+            info = read_info(episode)
             known[info.key] = info
     known |= {info.key: info for info in read_ledger(folder / DATASET) or ()}
     return tuple(known[key] for key in sorted(known))
 
 
 def _lines(path: Path) -> Iterator[EpisodeInfo]:
-    """The whole lines of a file whose last line may have been cut off by a kill."""
-    for line in path.read_text(encoding="utf-8", errors="replace").splitlines():
-        try:
-            yield EpisodeInfo.model_validate(json.loads(line))
-        except (ValueError, ValidationError):
+    """What a file tells, without lines that were cut off: by a kill, a full disk, or the power, which leaves zeros."""
+    for number, line in enumerate(_read(path).split(b"\n"), start=1):
+        if not (said := line.strip(b"\0 \r")):
             continue
+        try:
+            yield EpisodeInfo.model_validate_json(said)
+        except ValidationError as error:
+            if said.startswith(b"{") and error.errors()[0]["type"] == "json_invalid":
+                continue
+            raise UsageError(
+                f"Line {number} of {path} is no attempt of this version of maniagent. Restore the file from a copy, "
+                "or remove the line; episodes that are kept are known without it."
+            ) from error
+
+
+def _read(path: Path) -> bytes:
+    try:
+        return path.read_bytes()
+    except OSError as error:
+        raise UsageError(f"{path} can't be read: {error.strerror}.") from error
+
+
+def _ends_a_line(path: Path) -> bool:
+    with path.open("rb") as file:
+        file.seek(-1, os.SEEK_END)
+        return file.read(1) == b"\n"

@@ -16,6 +16,7 @@ from typing import Self
 from ..errors import ManiAgentError, SetupError
 from ..processes import become_worker
 from .crew import Died, Hand
+from .disk import disk_errors_told
 from .keeper import Keeper, Kept
 from .ledger import read_attempts
 from .settings import CollectSettings
@@ -89,9 +90,10 @@ def _log(folder: Path, worker: int) -> Path:
 
 def _work(connection: Connection, settings: CollectSettings, worker: int, folder: Path) -> None:
     """What a worker process does."""
-    become_worker(_log(folder, worker))
     os.environ.setdefault("LP_NUM_THREADS", "0")  # software rendering: workers share the cores already
     try:
+        with disk_errors_told(_log(folder, worker)):
+            become_worker(_log(folder, worker))
         keeper = Keeper(folder, worker)
         for said in Share(settings, worker, read_attempts(folder), Table.load(folder, worker)).work():
             connection.send(keeper.keep(said) if isinstance(said, Tried) else said)

@@ -11,6 +11,8 @@ import uuid
 from dataclasses import asdict, dataclass
 from pathlib import Path
 
+from .disk import disk_errors_told
+
 SESSIONS = "sessions.jsonl"
 
 
@@ -43,7 +45,7 @@ class Session:
         seconds = time.monotonic() - self._began
         costs = Costs(seconds, seconds * self._workers, self._writing, self._encoding)
         rounded = {name: round(value, 3) for name, value in asdict(costs).items()}
-        with self._path.open("a", encoding="utf-8") as file:
+        with disk_errors_told(self._path), self._path.open("a", encoding="utf-8") as file:
             file.write(json.dumps({"session": self._name} | rounded) + "\n")
 
 

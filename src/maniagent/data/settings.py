@@ -21,6 +21,7 @@ from ..envs.scene import describe_validation
 from ..errors import ReasoningFailure, UsageError
 from ..robots.sampling import Sampling
 from ..tasks import task_named
+from .disk import disk_errors_told, draft_of, write_whole
 from .learnt import learnt_moves
 from .moves import Move, check_moves, moves_of
 from .outcome import THRESHOLD
@@ -70,27 +71,30 @@ class CollectSettings(BaseModel):
     def save(self, folder: Path) -> None:
         """Write them down, or compare with those that are there: a folder holds one collection.
 
-        Raises UsageError where the folder holds another one, or something else.
+        Raises UsageError where the folder holds another one, or something else, or can't be made or written to;
+        SetupError where the disk is full.
         """
         path = folder / SETTINGS
-        if path.exists():
-            self._compare(type(self).load(folder), folder)
-        elif folder.exists() and any(folder.iterdir()):
-            raise UsageError(f"{folder} holds something that is no collection; name another folder.")
-        folder.mkdir(parents=True, exist_ok=True)
-        draft = path.with_suffix(".tmp")
-        draft.write_text(self.model_dump_json(indent=2) + "\n", encoding="utf-8")
-        draft.replace(path)
+        with disk_errors_told(folder):
+            folder.mkdir(parents=True, exist_ok=True)
+            if path.exists():
+                self._compare(type(self).load(folder), folder)
+            elif any(there != draft_of(path) for there in folder.iterdir()):
+                raise UsageError(f"{folder} holds something that is no collection; name another folder.")
+        write_whole(path, self.model_dump_json(indent=2) + "\n")
 
     @classmethod
     def load(cls, folder: Path) -> Self:
         """The settings of a collection; UsageError where the folder holds none that can be read."""
         try:
-            return cls.model_validate_json((folder / SETTINGS).read_text(encoding="utf-8"))
+            return cls.model_validate_json((folder / SETTINGS).read_bytes())
         except FileNotFoundError:
             raise UsageError(f"{folder} is no collection: it has no {SETTINGS}.") from None
         except (OSError, ValidationError) as error:
-            raise UsageError(f"{folder / SETTINGS} can't be read: {error}.") from error
+            what = describe_validation(error) if isinstance(error, ValidationError) else str(error.strerror)
+            raise UsageError(
+                f"{folder / SETTINGS} can't be read: {what}. Restore it from a copy, or name another folder."
+            ) from error
 
     def _compare(self, there: Self, folder: Path) -> None:
         mine, theirs = self.model_dump(), there.model_dump()

@@ -10,7 +10,6 @@ so that whoever is killed, at whatever moment, leaves whole episodes and perhaps
 
 from __future__ import annotations
 
-import errno
 import os
 import re
 import shutil
@@ -23,15 +22,16 @@ from typing import IO, Any
 import numpy as np
 from numpy.lib import format as npy
 from numpy.typing import NDArray
+from pydantic import ValidationError
 
-from ..errors import ManiAgentError, SetupError, UsageError
+from ..errors import UsageError
+from .disk import disk_errors_told
 from .episode import EpisodeInfo, Recording, Steps
 
 INFO, STEPS = "episode.json", "steps.npz"
 QUARANTINE = "quarantine"
 _PART = ".part"
 _ARRAYS = ("time", "joints", "opening", "tcp", "joint_targets", "opening_target", "tcp_delta")
-_FULL = frozenset({errno.ENOSPC, errno.EDQUOT, errno.EFBIG})
 _CAMERA = re.compile(r"[A-Za-z0-9][A-Za-z0-9_.-]*")
 
 
@@ -45,7 +45,7 @@ class Staging:
         """
         self.folder = Path(folder)
         self._keep_failed = keep_failed
-        with _explained(self.folder):
+        with disk_errors_told(self.folder):
             (self.folder / QUARANTINE).mkdir(parents=True, exist_ok=True)
         if not os.access(self.folder, os.W_OK | os.X_OK):
             raise UsageError(f"{self.folder} can't be written to. Name another folder, or let yourself write there.")
@@ -82,7 +82,7 @@ class Staging:
 
         To be called before anybody writes: what a living process is writing looks the same.
         """
-        with _explained(self.folder):
+        with disk_errors_told(self.folder):
             left = [path for place in (self.folder, self.folder / QUARANTINE) for path in place.glob(f".*{_PART}/")]
             for path in left:
                 shutil.rmtree(path)
@@ -98,7 +98,7 @@ class Staging:
             recording = None
         final, draft = place / info.key, place / f".{info.key}{_PART}"
         size = 0 if recording is None else sum(array.nbytes for array in _pictures(recording).values())
-        with _explained(final, size):
+        with disk_errors_told(final, size):
             try:
                 shutil.rmtree(draft, ignore_errors=True)  # of a process that was killed while it wrote this one
                 draft.mkdir()
@@ -125,6 +125,15 @@ def load(path: Path) -> tuple[EpisodeInfo, Recording | None]:
         return info, Recording(steps, rgb=_mapped(path, "rgb"), depth=_mapped(path, "depth"))
     except (OSError, ValueError, KeyError, EOFError, zipfile.BadZipFile) as error:
         raise UsageError(f"{path} holds no whole episode ({error}). Remove it, and collect it again.") from error
+
+
+def read_info(path: Path) -> EpisodeInfo:
+    """What is known of an episode. Raises UsageError where its folder says nothing that can be read."""
+    try:
+        return EpisodeInfo.model_validate_json((path / INFO).read_bytes())
+    except (OSError, ValidationError) as error:
+        what = "it isn't whole" if isinstance(error, ValidationError) else str(error.strerror)
+        raise UsageError(f"{path / INFO} can't be read: {what}. Move the episode out of the folder.") from error
 
 
 def _mapped(path: Path, kind: str) -> dict[str, NDArray[Any]]:
@@ -188,21 +197,3 @@ def _sync_folder(path: Path) -> None:
         os.fsync(descriptor)
     finally:
         os.close(descriptor)
-
-
-@contextmanager
-def _explained(path: Path, size: int = 0) -> Iterator[None]:
-    """Turn the system's errors into ours."""
-    try:
-        yield
-    except OSError as error:
-        raise _explanation(error, path, size) from error
-
-
-def _explanation(error: OSError, path: Path, size: int) -> ManiAgentError:
-    if error.errno in _FULL:
-        needs = f" for an episode of {size / 1e6:.0f} MB" if size else ""
-        return SetupError(f"There is no room on the disk{needs} at {path}. Free some; what was committed is whole.")
-    if error.errno in (errno.EIO, errno.ENXIO, errno.ENODEV, errno.ESTALE):
-        return SetupError(f"The disk fails at {path}: {error.strerror}. What was committed before may need a check.")
-    return UsageError(f"{path} can't be written: {error.strerror}. Name another folder, or let yourself write there.")

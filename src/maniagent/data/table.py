@@ -14,6 +14,7 @@ from ..errors import UsageError
 from ..motion import ArmModel, MotionLimits
 from ..perception.views import Workspace
 from ..types import ObjectInfo, OrientedBox
+from .disk import write_whole
 from .reach import Reach
 from .settings import CollectSettings
 from .starts import Region
@@ -64,11 +65,8 @@ class Table(BaseModel):
             raise UsageError(f"{path} can't be read: {what}. Remove it, and it is made anew.") from error
 
     def save(self, folder: Path, worker: int) -> None:
-        """Write it down, as a whole or not at all."""
-        path = _path(folder, worker)
-        draft = path.with_suffix(".tmp")
-        draft.write_text(self.model_dump_json() + "\n", encoding="utf-8")
-        draft.replace(path)
+        """Write it down, as a whole or not at all; SetupError where the disk is full."""
+        write_whole(_path(folder, worker), self.model_dump_json() + "\n")
 
     def region(self, settings: CollectSettings) -> Region:
         """Where objects may start on it."""

@@ -105,7 +105,7 @@ def check_dataset(collection: Path, sampling: Sampling, *, robot_type: str = ROB
             _common_schema(dataset, _staged(collection), robot_type)
     except OSError as error:
         raise disk_error(error, collection) from error
-    check_rate(sampling.rate)
+    check_rate(sampling.rate, "--fps")
     if dataset.exists() and (found := unlike(read_schema(dataset), sampling, robot_type)):
         raise UsageError(f"{dataset} is of another kind: {'; '.join(found)}. Collect into another folder.")
 

@@ -40,7 +40,7 @@ def schema_of(folder: Path, info: EpisodeInfo, robot_type: str = ROBOT) -> Schem
     Only its images' headers are read. Raises UsageError where its rate isn't a whole number of frames a second, which
     LeRobot's videos can't have, or where an image file can't be read.
     """
-    check_rate(info.fps)
+    check_rate(info.fps, str(folder))
     features: dict[str, Feature] = {
         "observation.state": _numbers(_STATE),
         "observation.ee_pose": _numbers(("x", "y", "z", "qx", "qy", "qz", "qw")),
@@ -73,10 +73,10 @@ def read_schema(dataset: Path) -> Schema:
         ) from error
 
 
-def check_rate(fps: float) -> None:
-    """Raises UsageError for a rate that LeRobot's videos can't have."""
+def check_rate(fps: float, whose: str) -> None:
+    """Raises UsageError, which names `whose` it is, for a rate that LeRobot's videos can't have."""
     if fps != round(fps):
-        raise UsageError(f"LeRobot's videos have a whole number of frames a second, not {fps:g}; say another --fps.")
+        raise UsageError(f"{whose}: LeRobot's videos have a whole number of frames a second, not {fps:g}.")
 
 
 def unlike(have: Schema, sampling: Sampling, robot_type: str = ROBOT) -> list[str]:
