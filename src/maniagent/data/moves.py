@@ -23,6 +23,7 @@ from ..perception.rig import Rig
 from ..perception.vocabulary import Vocabulary
 from ..types import ActionSequence, Gripper, ObjectInfo, Orientation, SceneDescription, Subtask, SubtaskRecord, Verdict
 from .outcome import Outcomes
+from .recall import RecallingObjectAgent
 
 
 class Move(BaseModel):
@@ -109,9 +110,10 @@ class KnownMoves:
         self._moves, self._attempts, self._current = tuple(moves), attempts, None
 
     def agents(self, rig: Rig) -> Agents:
-        """All four roles; the eyes are those of the rules."""
+        """All four roles; the eyes are those of the rules, and know things again."""
         rules = rules_agents(rig)
-        return Agents("known moves", scene=rules.scene, reasoning=self, objects=rules.objects, controller=self)
+        eyes = RecallingObjectAgent(rules.objects)
+        return Agents("known moves", scene=rules.scene, reasoning=self, objects=eyes, controller=self)
 
     def next_subtask(self, instruction: str, scene: SceneDescription, memory: Memory) -> Subtask:
         """The next move, or the same again; cannot once it failed too often."""
