@@ -16,7 +16,7 @@ from typing import Any
 import numpy as np
 import pytest
 from made_collected import hand_path, made_collected
-from made_dataset import LENGTHS, SIZE, SUBTASKS, TASKS, edit_json, made_dataset, picture
+from made_dataset import LENGTHS, SIZE, SUBTASKS, TASKS, VIDEO, edit_json, made_dataset, picture
 from PIL import Image
 from scipy.spatial.transform import Rotation
 from tfds_python import PYTHON, needs_tfds
@@ -26,6 +26,7 @@ from maniagent.cli import app
 from maniagent.data.rlds import WriterFailure, export_rlds
 from maniagent.data.rlds.client import VARIABLE, find_interpreter, write
 from maniagent.data.rlds.episodes import Settings, Source
+from maniagent.data.rlds.registration import transforms
 from maniagent.data.rlds.writer import Ended, cut, read_episodes
 from maniagent.errors import ManiAgentError, SetupError, UsageError
 
@@ -197,6 +198,18 @@ def test_what_fails_leaves_nothing(dataset: Path, tmp_path: Path, monkeypatch: p
     assert list((tmp_path / "root").iterdir()) == []
 
 
+def test_a_video_that_is_missing_is_told_and_leaves_nothing(
+    dataset: Path, tmp_path: Path, monkeypatch: pytest.MonkeyPatch
+) -> None:
+    script = tmp_path / "fake.py"
+    script.write_text(READY + "sys.stdin.buffer.read()")
+    monkeypatch.setattr("maniagent.data.rlds.export.write", functools.partial(write, script=script))
+    (dataset / VIDEO).unlink()
+    with pytest.raises(UsageError, match="is missing"):
+        export_rlds(dataset, tmp_path / "root/out", python=HERE)
+    assert list((tmp_path / "root").iterdir()) == []
+
+
 def test_episodes_that_stop_early_are_noticed() -> None:
     with pytest.raises(Ended):
         list(read_episodes(io.BytesIO((9).to_bytes(8, "big") + b"short")))
@@ -241,6 +254,13 @@ for episode in builder.as_dataset(split="train"):
     for key in ("state", "image"):
         arrays[f"{number}.{key}"] = np.stack([step["observation"][key] for step in steps])
     arrays[f"{number}.action"] = np.stack([step["action"] for step in steps])
+# As OpenVLA's loader has it: an episode as whole arrays, through the transform that is registered.
+space = {"OXE_STANDARDIZATION_TRANSFORMS": {}}
+exec(sys.argv[4], space)
+raw = next(iter(builder.as_dataset(split="train", decoders={"steps": tfds.decode.SkipDecoding()})))["steps"]
+seen = space["OXE_STANDARDIZATION_TRANSFORMS"][sys.argv[2]](raw)
+shapes = [seen["observation"][key].shape[1] for key in ("EEF_state", "gripper_state")] + [seen["action"].shape[1]]
+assert shapes == [6, 1, 7], shapes
 np.savez(sys.argv[3], **arrays)
 json.dump(told, open(sys.argv[3] + ".json", "w"))
 """
@@ -256,7 +276,8 @@ def test_tensorflow_datasets_loads_what_was_exported(dataset: Path, tmp_path: Pa
     assert sorted(path.name for path in (tmp_path / "root").iterdir()) == ["demos"]
     env = {name: value for name, value in os.environ.items() if name != "PYTHONPATH"} | {"CUDA_VISIBLE_DEVICES": "-1"}
     read = tmp_path / "read.npz"
-    subprocess.run([str(PYTHON), "-c", READ, str(tmp_path / "root"), "demos", str(read)], check=True, env=env)
+    arguments = [str(tmp_path / "root"), "demos", str(read), transforms("demos")]
+    subprocess.run([str(PYTHON), "-c", READ, *arguments], check=True, env=env)
     told, arrays = json.loads(Path(f"{read}.json").read_text()), np.load(read)
     for number, length in enumerate(LENGTHS):
         about = told[str(number)]

@@ -77,26 +77,26 @@ def _converse(
     process: subprocess.Popen[bytes], request: Mapping[str, Any], episodes: Iterable[bytes], python: Path,
     said: IO[bytes], limit: float,
 ) -> dict[str, int]:  # fmt: skip
-    assert process.stdin is not None  # noqa: S101 - it was opened with pipes
-    assert process.stdout is not None  # noqa: S101
+    stdin, stdout = process.stdin, process.stdout
+    assert stdin is not None  # noqa: S101 - it was opened with pipes
+    assert stdout is not None  # noqa: S101
     watch = _Watch(process, limit)
 
     def answer() -> dict[str, int]:
         with watch:
-            line = process.stdout.readline() if process.stdout else b""
+            line = stdout.readline()
         if not line:
             raise _death(process, python, said, watch)
         return _unwrap(json.loads(line))
 
     answer()
-    parts = iter(episodes)
     try:
-        process.stdin.write(json.dumps(request).encode() + b"\n")
-        for episode in parts:
+        stdin.write(json.dumps(request).encode() + b"\n")
+        for episode in episodes:
             with watch:
-                process.stdin.write(len(episode).to_bytes(8, "big") + episode)
-        process.stdin.write(bytes(8))
-        process.stdin.flush()
+                stdin.write(len(episode).to_bytes(8, "big") + episode)
+        stdin.write(bytes(8))
+        stdin.flush()
     except BrokenPipeError:
         pass  # it ended early, and its answer says why
     return answer()

@@ -62,7 +62,7 @@ class Source:
         self.cameras = self._cameras()
         """Features that hold pictures, by the names that they get: `image` is the first."""
         self._fingers = settings.fingers or _fingers(self.dataset.info.robot)
-        self._collected = read_collected(root)
+        self._keys = {number: info.key for number, info in enumerate(read_collected(root) or ())}
         if not self.dataset.episodes:
             raise UsageError(f"{root} has no episodes.")
 
@@ -92,7 +92,7 @@ class Source:
             "action": moves.action,
             "subtask": np.array([texts[row] for row in rows]),
             "language_instruction": np.array(self._instruction(episode)),
-            "key": np.array(self._collected[episode.index].key if self._collected else str(episode.index)),
+            "key": np.array(self._keys.get(episode.index, str(episode.index))),
             "episode_index": np.array(episode.index),
         }
         for name, feature in self.cameras.items():

@@ -1,8 +1,8 @@
 """What a person adds to OpenVLA or CogACT so that their loader knows a dataset; it is written beside the dataset.
 
 Both look a dataset up by its name in three tables of `prismatic/vla/datasets/rlds/oxe`: configs.py says which features
-are pictures and states, transforms.py brings them into the form that all datasets have, mixtures.py names what is
-trained on.
+are pictures and states, transforms.py brings them into the form that all datasets have, mixtures.py names
+what is trained on together.
 """
 
 from __future__ import annotations
@@ -37,7 +37,8 @@ Both read a dataset that is registered in three files of `prismatic/vla/datasets
 {transforms}
 ```
 
-`mixtures.py`, at its end (for CogACT, and for training OpenVLA as a whole; its LoRA script goes without):
+`mixtures.py`, at its end. A name that isn't there stands for the dataset alone, so this can wait until there are
+others to train on as well, each with its weight:
 
 ```python
 {mixtures}

@@ -123,22 +123,21 @@ def write(request: dict[str, Any], stream: BinaryIO) -> dict[str, Any]:
         data_dir=request["folder"],
         description=request["description"],
     )
-    return count(Path(request["folder"]) / request["name"] / request["version"], names)
+    return count(Path(request["folder"]) / request["name"] / request["version"])
 
 
-def count(folder: Path, images: list[str]) -> dict[str, Any]:
-    """Load the dataset again and count its episodes and steps, and those that end one."""
+def count(folder: Path) -> dict[str, Any]:
+    """Load the dataset again, with steps as whole arrays as OpenVLA has it; count episodes, steps, last steps."""
     import tensorflow_datasets as tfds
 
-    builder = tfds.builder_from_directory(folder)
-    skip = {name: tfds.decode.SkipDecoding() for name in images}
-    read = builder.as_dataset(split="train", decoders={"steps": {"observation": skip}})
-    lengths, ends = [], 0
-    for episode in read:
-        is_last = np.concatenate([part["is_last"].numpy() for part in episode["steps"].batch(1024)])
-        lengths.append(len(is_last))
-        ends += int(is_last.sum()) * bool(is_last[-1])
-    return {"episodes": len(lengths), "steps": sum(lengths), "ends": ends}
+    read = tfds.builder_from_directory(folder).as_dataset(
+        split="train",
+        decoders={"steps": tfds.decode.SkipDecoding()},
+        read_config=tfds.ReadConfig(try_autocache=False, skip_prefetch=True, interleave_cycle_length=1),
+    )
+    lasts = [episode["steps"]["is_last"].numpy() for episode in read]
+    ended = sum(int(is_last.sum() == 1 and is_last[-1]) for is_last in lasts)
+    return {"episodes": len(lasts), "steps": sum(map(len, lasts)), "ends": ended}
 
 
 def main() -> None:
