@@ -442,7 +442,7 @@ def steps(*kept: int, **changed: Any) -> Json:
         (steps(0, up=1e9), "less than or equal to 1"),
         (steps(0, do=""), "at least 1"),
         (steps(0, to="moon"), "Input should be"),
-        ({"skill": "x", "steps": [PUT["steps"][0]] * 17}, "at most 16"),
+        ({"skill": "x", "steps": [PUT["steps"][0]] * 17}, "at most 12"),
     ],
 )
 def test_movements_that_can_not_be_made_are_sent_back_and_mended(answer: Json, said: str) -> None:

@@ -9,7 +9,7 @@ from hypothesis import given
 from hypothesis import strategies as st
 
 from maniagent.agents.binding import bind
-from maniagent.agents.minds.answers import Written
+from maniagent.agents.minds.answers import Written, WrittenStep
 from maniagent.agents.minds.prompts import Prompts
 from maniagent.agents.minds.steps import to_sequence
 from maniagent.agents.rules.controller import RulesControllerAgent
@@ -108,3 +108,16 @@ def test_a_long_thing_points_as_told_for_every_viewpoint(view_yaw: float, lie: s
 def test_steps_that_mean_nothing_are_sent_back_with_their_number(steps: list[dict[str, Any]], said: str) -> None:
     with pytest.raises(Unfit, match=rf"Step {len(steps)} .*{said}"):
         keypoints(*steps)
+
+
+def test_the_schema_offers_no_step_that_can_not_be_meant() -> None:
+    kinds = Written.model_json_schema()["$defs"]["WrittenStep"]["anyOf"]
+    own, other, point, here = (kind["properties"] for kind in kinds)
+    assert "grasp" in own["to"]["enum"]
+    assert own["object"]["const"] == 0
+    assert "grasp" not in other["to"]["enum"]
+    assert other["object"]["minimum"] == 1
+    assert {"x", "y"} <= set(kinds[2]["required"])
+    assert not {"x", "y", "object"} & set(here)
+    assert list(own)[:3] == list(other)[:3] == ["do", "object", "to"], "what follows from something comes after it"
+    assert set().union(own, other, point, here) == set(WrittenStep.model_fields)

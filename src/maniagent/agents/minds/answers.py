@@ -7,7 +7,7 @@ said in the prompts; `steps` says what becomes of a written step.
 from __future__ import annotations
 
 import re
-from typing import Annotated, Any, Literal
+from typing import Annotated, Any, Literal, get_args
 
 from pydantic import AfterValidator, BaseModel, BeforeValidator, ConfigDict, Field
 
@@ -34,7 +34,10 @@ Coordinate = Annotated[float, Field(ge=-2.0, le=2.0, allow_inf_nan=False)]
 """m"""
 Heading = Literal["left", "right", "away", "towards"]
 """As the viewer sees it."""
-Place = Literal["grasp", "surface", "free", "top", "base", "centre", "left", "right", "near", "far", "point", "here"]
+OfObject = Literal["surface", "free", "top", "base", "centre", "left", "right", "near", "far"]
+Place = Literal["grasp", OfObject, "point", "here"]
+LONGEST = 12
+"""Steps; what has more goes round in circles."""
 
 
 def _untitled(schema: dict[str, Any]) -> None:
@@ -82,12 +85,51 @@ class Choice(Answer):
     """0 for none of them."""
 
 
+def _only_what_makes_sense(schema: dict[str, Any]) -> None:
+    """Offer the kinds of steps apart, so that a schema that is enforced lets no step be written that can't be meant.
+
+    Only object 0 can be grasped; a point has coordinates and no object. The object comes before its place, as that
+    follows from it.
+    """
+    _untitled(schema)
+    fields = schema.pop("properties")
+    for field in fields.values():
+        field.pop("default", None)
+    needed = schema.pop("required")
+    do, held, x, y = (fields.pop(name) for name in ("do", "object", "x", "y"))
+    del fields["to"]
+    index, number = held["anyOf"][0], x["anyOf"][0]
+    of_object = {"type": "string", "enum": list(get_args(OfObject))}
+    at_own = {"type": "string", "enum": ["grasp", *get_args(OfObject)]}
+    in_place = {name: field for name, field in fields.items() if name not in ("lie", "end")}
+
+    def kind(more: dict[str, Any], needs: tuple[str, ...] = (), **own: Any) -> dict[str, Any]:
+        properties = {"do": do, **own, **more}
+        return {
+            "type": "object",
+            "properties": properties,
+            "required": [*needed, *needs],
+            "additionalProperties": False,
+        }
+
+    schema.pop("type")
+    schema.pop("additionalProperties")
+    schema["anyOf"] = [
+        kind(fields, ("object",), object={"type": "integer", "const": 0}, to=at_own),
+        kind(fields, ("object",), object={**index, "minimum": 1}, to=of_object),
+        kind(fields, ("x", "y"), to={"type": "string", "const": "point"}, x=number, y=y["anyOf"][0]),
+        kind(in_place, to={"type": "string", "const": "here"}),
+    ]
+
+
 class WrittenStep(Answer):
     """One step of a movement."""
 
+    model_config = ConfigDict(json_schema_extra=_only_what_makes_sense)
+
     do: Annotated[str, BeforeValidator(_tidy), Field(min_length=1, max_length=120)]
-    to: Place
     object: Annotated[int, Field(ge=0, le=63)] | None = None
+    to: Place
     x: Coordinate | None = None
     y: Coordinate | None = None
     right: Offset = 0.0
@@ -95,7 +137,7 @@ class WrittenStep(Answer):
     up: Offset = 0.0
     turn: Annotated[float, Field(ge=-360.0, le=360.0, allow_inf_nan=False)] = 0.0
     """Degrees, counter-clockwise seen from above."""
-    lie: Literal["keep"] | Heading = "keep"
+    lie: Literal["keep", Heading] = "keep"
     """Where a long thing points on arrival."""
     end: Heading | None = None
     """Which end shall point there: the one that points this way now."""
@@ -106,4 +148,4 @@ class Written(Answer):
     """A movement."""
 
     skill: Annotated[str, BeforeValidator(_tidy), Field(min_length=1, max_length=40)]
-    steps: Annotated[tuple[WrittenStep, ...], Field(min_length=1, max_length=16)]
+    steps: Annotated[tuple[WrittenStep, ...], Field(min_length=1, max_length=LONGEST)]
