@@ -16,7 +16,7 @@ from maniagent.data.rlds.client import VARIABLE
 
 def found_python() -> Path | None:
     """The interpreter in MANIAGENT_TFDS_PYTHON, else this one."""
-    if VARIABLE in os.environ:
+    if os.environ.get(VARIABLE):
         return Path(os.environ[VARIABLE])
     return Path(sys.executable) if importlib.util.find_spec("tensorflow_datasets") else None
 
