@@ -1,4 +1,4 @@
-"""What worker processes owe their parent: to end with it, and to keep what libraries print out of its lines."""
+"""What worker processes owe their parent: to end with it, and to keep out of its lines what they print."""
 
 from __future__ import annotations
 
@@ -6,7 +6,36 @@ import multiprocessing
 import os
 import signal
 import threading
+from collections.abc import Iterator
+from contextlib import contextmanager
 from pathlib import Path
+
+
+@contextmanager
+def starting_workers() -> Iterator[None]:
+    """Hold Ctrl-C back while worker processes are started.
+
+    One that is cut off in its start, or that hears Ctrl-C before `become_worker`, would print a traceback. Ours is told
+    in the end; in those that were started the signal stays blocked.
+    """
+    pressed = False
+
+    def note(number: int, frame: object) -> None:
+        nonlocal pressed
+        pressed = True
+
+    if threading.current_thread() is not threading.main_thread():  # which doesn't hear it
+        yield
+        return
+    before = signal.signal(signal.SIGINT, note)  # another thread may take the signal, mask or not
+    mask = signal.pthread_sigmask(signal.SIG_BLOCK, {signal.SIGINT})  # this is what they inherit
+    try:
+        yield
+    finally:
+        signal.pthread_sigmask(signal.SIG_SETMASK, mask)
+        signal.signal(signal.SIGINT, before)
+    if pressed:
+        signal.raise_signal(signal.SIGINT)
 
 
 def become_worker(log: Path | None) -> None:

@@ -14,7 +14,7 @@ from types import TracebackType
 from typing import Self
 
 from ..errors import ManiAgentError, SetupError
-from ..processes import become_worker
+from ..processes import become_worker, starting_workers
 from .crew import Died, Hand
 from .disk import disk_errors_told
 from .keeper import Keeper, Kept
@@ -59,7 +59,8 @@ class _Process:
         context = multiprocessing.get_context("spawn")  # rendering contexts and threads don't survive a fork
         self.connection, theirs = context.Pipe()
         self._process = context.Process(target=_work, args=(theirs, settings, worker, folder), daemon=True)
-        self._process.start()
+        with starting_workers():
+            self._process.start()
         theirs.close()  # so that its death shows as the end of the connection
 
     def take(self) -> Kept | Asked | Table | None:
