@@ -15,6 +15,7 @@ from typer.testing import CliRunner
 from maniagent.cli import app
 from maniagent.data.collector import write_summary
 from maniagent.data.ledger import attempts_file, key_of, note, read_attempts
+from maniagent.data.lerobot.generation import locked
 from maniagent.data.lerobot.publish import DATASET, STAGED, check_dataset
 from maniagent.data.sessions import Session
 from maniagent.data.settings import CollectSettings
@@ -48,6 +49,12 @@ def test_a_file_is_no_folder(tmp_path: Path) -> None:
     assert "notes.txt can't be written: File exists. Name another folder" in refusal(tmp_path / "notes.txt")
     assert "can't be written: Not a directory" in refusal(tmp_path / "notes.txt" / "carrots")
     assert (tmp_path / "notes.txt").read_text() == "mine"
+
+
+def test_two_collections_into_one_folder_at_once_are_one_too_many(tmp_path: Path) -> None:
+    folder = made(tmp_path / "carrots")
+    with locked(folder, name=".collect.lock"):
+        assert "Another process is changing" in refusal(folder)
 
 
 def test_a_folder_is_made_with_those_above_it(tmp_path: Path) -> None:

@@ -16,6 +16,7 @@ from .disk import disk_errors_told, write_whole
 from .episode import EpisodeInfo
 from .ledger import parts_of, read_attempts
 from .lerobot.client import Writer
+from .lerobot.generation import locked
 from .lerobot.publish import STAGED, Published, check_dataset, publish
 from .local import ThisMachine
 from .sessions import Session, read_costs
@@ -30,6 +31,7 @@ BATCH = 25
 """Episodes that go into the dataset at a time."""
 MOST_WAITING = 8
 """Batches that may wait for the dataset before workers have to; at the defaults an episode takes 65 MB until then."""
+_LOCK = ".collect.lock"
 _PATIENCE = 0.5
 """s between looks at what the writer does."""
 
@@ -70,33 +72,34 @@ def collect(
     puts things back by itself, as soon as `helper` returns. `ray` is the address of a cluster whose nodes work. At any
     moment everything may be killed: what was kept stays, and at most the episodes in progress are lost.
 
-    Raises UsageError for a folder that holds something else, SetupError where nothing can be kept or no worker gets
-    anywhere, WriterFailure where lerobot fails, whatever `helper` raises.
+    Raises UsageError for a folder that holds something else or is collected into already, SetupError where nothing can
+    be kept or no worker gets anywhere, WriterFailure where lerobot fails, whatever `helper` raises.
     """
     settings.save(folder)
-    _check(settings, folder, writer)
-    try:
-        watcher.begin(settings.count, read_attempts(folder))
-        session = Session(folder, settings.workers)
-        with (
-            RayCluster(settings, folder, ray) if ray is not None else ThisMachine(settings, folder) as place,
-            Crew(place, settings.workers, folder) as crew,
-            _Publisher(folder, writer, batch, watcher, session) as publisher,
-        ):
-            while crew.busy:
-                for said in crew.hear(_PATIENCE):
-                    if isinstance(said, Asked):
-                        helper(said.why)
-                        continue
-                    watcher.add(said.info)
-                    session.add(writing=said.seconds)
-                    publisher.add(said.info)
-                publisher.check()
-                if not publisher.behind:
-                    crew.go_on()
-            publisher.finish()
-    finally:
-        summary = write_summary(settings, folder)
+    with locked(folder, wait=1.0, name=_LOCK):
+        _check(settings, folder, writer)
+        try:
+            watcher.begin(settings.count, read_attempts(folder))
+            session = Session(folder, settings.workers)
+            with (
+                RayCluster(settings, folder, ray) if ray is not None else ThisMachine(settings, folder) as place,
+                Crew(place, settings.workers, folder) as crew,
+                _Publisher(folder, writer, batch, watcher, session) as publisher,
+            ):
+                while crew.busy:
+                    for said in crew.hear(_PATIENCE):
+                        if isinstance(said, Asked):
+                            helper(said.why)
+                        else:
+                            watcher.add(said.info)
+                            session.add(writing=said.seconds)
+                            publisher.add(said.info)
+                    publisher.check()
+                    if not publisher.behind:
+                        crew.go_on()
+                publisher.finish()
+        finally:
+            summary = write_summary(settings, folder)
     return summary
 
 

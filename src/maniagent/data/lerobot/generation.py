@@ -34,13 +34,13 @@ _NO_LINK = (errno.EPERM, errno.EXDEV, errno.EMLINK, errno.ENOTSUP, errno.ENOSYS)
 
 
 @contextlib.contextmanager
-def locked(folder: Path, wait: float = 10.0) -> Iterator[None]:
-    """Be the only process that changes what is in the folder.
+def locked(folder: Path, wait: float = 10.0, *, name: str = ".publish.lock") -> Iterator[None]:
+    """Be the only process that changes what is in the folder, of those that lock the same `name` there.
 
     Raises UsageError where another one still does after `wait` seconds; one that is killed lets go at once.
     """
     end = time.monotonic() + wait
-    with (folder / ".publish.lock").open("w") as file:
+    with (folder / name).open("w") as file:
         while True:
             try:
                 fcntl.flock(file, fcntl.LOCK_EX | fcntl.LOCK_NB)
