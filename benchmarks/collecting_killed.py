@@ -240,7 +240,7 @@ def trial(said: argparse.Namespace, console: Console) -> list[Round]:
     while kills < said.kills:
         done = run.round(len(rounds), float(rng.uniform(0, said.seconds)))
         rounds.append(done)
-        console.print(told(done))
+        console.print(told(done), soft_wrap=True)
         kills += done.killed_after is not None
         if done.phase == "done":
             if done.problems:
@@ -248,7 +248,7 @@ def trial(said: argparse.Namespace, console: Console) -> list[Round]:
             run.want_more()
     last = run.round(len(rounds), None)
     run.examine_deeply(last)
-    console.print(told(last))
+    console.print(told(last), soft_wrap=True)
     return [*rounds, last]
 
 

@@ -7,6 +7,7 @@ import signal
 import sys
 import textwrap
 import time
+from concurrent.futures import ThreadPoolExecutor
 from pathlib import Path
 
 import pytest
@@ -81,6 +82,32 @@ def test_a_writer_that_does_not_start_is_ended(tmp_path: Path) -> None:
     body = "import time; time.sleep(60)"
     with fake(tmp_path, body, start_limit=0.3) as writer, pytest.raises(WriterFailure, match="to start"):
         ask(writer)
+
+
+def test_a_request_can_be_interrupted_by_another_thread(tmp_path: Path) -> None:
+    asked = tmp_path / "asked"
+    body = READY + f'sys.stdin.readline(); open("{asked}", "w").close(); time.sleep(60)'
+    with fake(tmp_path, body) as writer, ThreadPoolExecutor() as threads:
+        asking = threads.submit(ask, writer)
+        while not asked.exists():
+            time.sleep(0.01)
+        writer.interrupt()
+        with pytest.raises(WriterFailure, match="signal 9"):
+            asking.result(timeout=10)
+
+
+def test_interrupting_nothing_does_no_harm(tmp_path: Path) -> None:
+    with fake(tmp_path, READY) as writer:
+        writer.interrupt()
+
+
+def test_an_interpreter_without_lerobot_is_found_without_starting_the_writer(tmp_path: Path) -> None:
+    python = tmp_path / "python"
+    for script, told in (("#!/bin/sh\nexit 1\n", "has no lerobot"), ("#!/nowhere\n", "doesn't start")):
+        python.write_text(script)
+        python.chmod(0o755)
+        with pytest.raises(SetupError, match=told):
+            Writer(python).check()
 
 
 def test_an_interpreter_without_lerobot_is_told_with_what_to_do(tmp_path: Path) -> None:
