@@ -16,7 +16,8 @@ from ..agents.rules import rules_agents
 from ..envs.tabletop import TabletopEnv
 from ..robots.simulated import SimulatedRobot
 from ..tasks import task_named
-from ..types import Subtask, Verdict
+from ..tasks.conditions import AnyCondition
+from ..types import ObjectInfo, Subtask, Verdict
 from .chain import Chain, ChainSettings
 from .settings import CollectSettings
 from .starts import Pattern, Start, plan_starts
@@ -47,8 +48,10 @@ class TwinStation:
             settings.sampling,
             ChainSettings(threshold=settings.threshold, by_move=settings.texts == "move"),
         )
-        self.table = table or self._look(robot)
+        seen, moved = self._look(robot)
+        self.table = table or seen
         """What the plan of starts depends on."""
+        self._success = self._success_of(moved)
 
     def __enter__(self) -> Self:
         return self
@@ -84,25 +87,37 @@ class TwinStation:
         """The true distance (m) of the object from its target, and whether the task's predicate holds."""
         self._env.settle(0.5)
         truth = self._env.truth()
-        moved = truth[self._true_name].T_base_object[:2, 3]
-        names = self._episode.success[0].names()
-        target = names[1] if len(names) > 1 else None
-        distance = None if target is None else float(np.linalg.norm(moved - truth[target].T_base_object[:2, 3]))
+        thing, *target = (truth[name].T_base_object[:2, 3] for name in self._success.names())
+        distance = float(np.linalg.norm(thing - target[0])) if target else None
         return distance, self._episode.achieved(truth)
 
     @property
     def _true_name(self) -> str:
-        """What the scene calls the object that is moved, by the task's condition; for resets and statistics only."""
-        return self._episode.success[0].names()[0]
+        """What the scene calls the object that is moved first; for resets and statistics only."""
+        return self._success.names()[0]
 
-    def _look(self, robot: SimulatedRobot) -> Table:
-        """What is on the table, as the robot sees it at first."""
-        first = self._settings.moves[0]
-        subtask = Subtask(previous=Verdict.INITIAL, reason="", text=first.text, objects=first.objects)
+    def _success_of(self, moved: ObjectInfo) -> AnyCondition:
+        """The task's condition on the object that the robot moves first, whatever that is called."""
+        truth = self._env.truth()
+
+        def off(condition: AnyCondition) -> float:
+            return float(np.linalg.norm(truth[condition.names()[0]].T_base_object[:2, 3] - moved.centre[:2]))
+
+        return min(self._episode.success, key=off)
+
+    def _look(self, robot: SimulatedRobot) -> tuple[Table, ObjectInfo]:
+        """What is on the table, as the robot sees it at first, and the object that moves first.
+
+        Raises DetectionFailure where anything that the moves name isn't there.
+        """
         robot.go_home()
-        located = rules_agents(robot.rig).objects.locate(subtask, robot.observe(), Memory())
+        observation = robot.observe()
+        eyes = rules_agents(robot.rig).objects
+        for move in reversed(self._settings.moves):
+            subtask = Subtask(previous=Verdict.INITIAL, reason="", text=move.text, objects=move.objects)
+            located = eyes.locate(subtask, observation, Memory())
         moved, *others = (*located.objects, *located.surroundings)
-        return Table.seen(moved, others)
+        return Table.seen(moved, others), moved
 
 
 def _seed(seed: int, worker: int) -> int:
