@@ -11,6 +11,7 @@ from pathlib import Path
 from types import SimpleNamespace
 from typing import Any, Self
 
+import numpy as np
 import pytest
 from rich.console import Console
 from staged import made_info
@@ -138,6 +139,21 @@ def test_help_that_does_not_help_ends_it(share: Any) -> None:
 def test_attempts_that_never_succeed_end_it(share: Any) -> None:
     with pytest.raises(SetupError, match=f"{MOST_FAILURES} attempts in a row came to nothing; the last: it slipped"):
         share([""], [FAILED])
+
+
+@pytest.mark.slow
+def test_the_same_seed_makes_the_same_episodes() -> None:
+    said = settings(count=2, sampling={"width": 64, "height": 48})
+    one, again = (list(Share(said, 0).work()) for _ in range(2))
+    assert one[0] == again[0]
+    for a, b in zip(one[1:], again[1:], strict=True):
+        assert isinstance(a, Tried) and isinstance(b, Tried)  # noqa: PT018
+        assert a.info.model_copy(update={"seconds": 0.0}) == b.info.model_copy(update={"seconds": 0.0})
+        assert a.recording is not None and b.recording is not None  # noqa: PT018
+        assert np.array_equal(a.recording.steps.joints, b.recording.steps.joints)
+        assert np.array_equal(a.recording.rgb["main"], b.recording.rgb["main"])
+    other = list(Share(settings(count=1, seed=1, sampling={"width": 64, "height": 48}), 0).work())
+    assert other[1].info.start != one[1].info.start  # type: ignore[union-attr]
 
 
 # A crew ---------------------------------------------------------------------------------------------------------

@@ -89,13 +89,16 @@ def rows(summary: Summary) -> list[tuple[str, str]]:
         ("wall time", f"{summary.seconds:.0f} s"),
         ("valid episodes an hour", "–" if summary.per_hour is None else f"{summary.per_hour:.0f}"),
         ("writing episodes", f"{_percent(summary.writing_share)} of the workers' time"),
-        (
-            "encoding the dataset",
-            f"{summary.encoding_seconds:.1f} s of a core each, {_percent(summary.encoding_share)} of the machine's",
-        ),
+        ("encoding the dataset", _encoding(summary)),
         ("precision of the label", _percent(summary.precision)),
         ("recall of the label", _percent(summary.recall)),
     ]
+
+
+def _encoding(summary: Summary) -> str:
+    if not summary.encoding_seconds:
+        return "–"
+    return f"{summary.encoding_seconds:.1f} s of a core each, {_percent(summary.encoding_share)} of the machine's"
 
 
 def _percent(share: float | None) -> str:
