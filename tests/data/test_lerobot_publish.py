@@ -67,7 +67,9 @@ def test_episodes_are_published_in_the_order_of_their_keys_and_leave_their_folde
 def test_publishing_again_adds_what_is_new(collection: Path) -> None:
     publish(collection, writer=Scribe())
     stage(collection / "episodes", "a-late-one")
-    assert publish(collection, writer=Scribe()) == Published(collection / "dataset", added=1, total=4, processor_seconds=0.5)
+    assert publish(collection, writer=Scribe()) == Published(
+        collection / "dataset", added=1, total=4, processor_seconds=0.5
+    )
     assert keys(collection) == ["e0", "e1", "e2", "a-late-one"]
 
 
