@@ -105,7 +105,8 @@ def test_samples_are_due_within_half_a_control_period_of_the_fixed_rate(rate: fl
     due = [moving for k in range(ticks) if (moving := metronome.tick(start + k * PERIOD)) is not None]
     assert due[0] == 0.0
     assert np.abs(np.array(due) - np.arange(len(due)) / rate).max() <= PERIOD / 2 + 1e-9
-    assert len(due) == np.floor((ticks - 1) * PERIOD * rate + PERIOD * rate / 2 + 1e-9) + 1
+    last = (ticks - 0.5) * PERIOD * rate  # a sample that is due at the very end of a period may come or not
+    assert np.floor(last - 1e-6) + 1 <= len(due) <= np.floor(last + 1e-6) + 1
 
 
 @given(st.lists(st.floats(0.2, 1000.0), min_size=1, max_size=5))

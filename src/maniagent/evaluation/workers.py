@@ -13,7 +13,7 @@ from multiprocessing.connection import Connection, wait
 from pathlib import Path
 
 from ..errors import SetupError, UsageError
-from ..processes import become_worker
+from ..processes import become_worker, starting_workers
 from .episode import CRASH, TIME_LIMIT, EpisodeResult, Job, lost
 from .play import Play
 
@@ -68,7 +68,8 @@ class _Worker:
         self.connection, theirs = context.Pipe()
         self._most = play.suite.episodes_per_process
         self._process = context.Process(target=_serve, args=(theirs, play, log), daemon=True)
-        self._process.start()
+        with starting_workers():
+            self._process.start()
         theirs.close()  # so that its death shows as the end of the connection
         self.alive, self._ready = True, False
         self.job: Job | None = None
