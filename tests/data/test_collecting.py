@@ -216,6 +216,6 @@ def test_a_collection_that_is_killed_goes_on_and_has_lost_nothing(tmp_path: Path
     assert len(staged) == 3
     assert before.items() <= {path.name: (path / "episode.json").read_bytes() for path in staged}.items()
     assert not list((folder / STAGED).glob(".*"))
-    assert (folder / "coverage-w00.png").stat().st_size > 1000
+    assert (folder / "coverage.png").stat().st_size > 1000
     again = subprocess.run(command(folder, 3), capture_output=True, text=True, timeout=60, check=False)
     assert (again.returncode, json.loads(again.stdout)["attempts"]) == (0, figures["attempts"])

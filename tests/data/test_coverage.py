@@ -9,7 +9,7 @@ import pytest
 from PIL import Image
 
 from maniagent.data.chart import Chart
-from maniagent.data.coverage import COLOURS, REACHABLE, TABLE, Tried, draw_coverage
+from maniagent.data.coverage import COLOURS, REACHABLE, TABLE, Covered, Tried, draw_coverage
 from maniagent.data.reach import Reach
 from maniagent.data.starts import Region, Start, plan_starts
 from maniagent.motion import ArmModel, MotionLimits
@@ -41,7 +41,7 @@ def test_marks_lie_where_episodes_were_seen_to_begin(tmp_path: Path, region: Reg
     planned = tuple(Start(i, (0.25, y), 0.4) for i, y in enumerate((-0.2, 0.0, 0.2)))
     began = ((0.22, -0.2), None, (0.25, 0.23))
     tried = [Tried(start.xy, label, xy) for start, label, xy in zip(planned, COLOURS, began, strict=True)]
-    picture = draw_coverage(region, planned, tried, viewpoint, tmp_path / "new" / "coverage.png")
+    picture = draw_coverage([Covered(region, planned, tried)], viewpoint, tmp_path / "new" / "coverage.png")
     chart = chart_of(region, viewpoint)
     for episode in tried:
         place = chart.pixel(np.array(episode.began or episode.planned))
@@ -50,7 +50,7 @@ def test_marks_lie_where_episodes_were_seen_to_begin(tmp_path: Path, region: Reg
 
 @pytest.mark.parametrize("viewpoint", [FROM_THE_FRONT, FROM_BEHIND, ASLANT])
 def test_the_shade_is_the_region(tmp_path: Path, region: Region, viewpoint: Viewpoint) -> None:
-    picture = draw_coverage(region, (), (), viewpoint, tmp_path / "coverage.png")
+    picture = draw_coverage([Covered(region, (), ())], viewpoint, tmp_path / "coverage.png")
     chart = chart_of(region, viewpoint)
     for xy, colour in (((0.25, 0.15), REACHABLE), ((0.33, -0.12), REACHABLE), ((0.48, 0.33), TABLE)):
         assert colour_at(picture, chart.pixel(np.array(xy))) == pytest.approx(colour, abs=6)
@@ -69,7 +69,9 @@ def test_what_is_to_the_viewers_right_is_to_the_right_and_what_is_far_is_up(regi
 def test_the_same_collection_gives_the_same_picture(tmp_path: Path, region: Region) -> None:
     planned = plan_starts(region, 30)
     tried = [Tried(start.xy, "valid", start.xy) for start in planned[:20]]
-    pictures = [draw_coverage(region, planned, tried, FROM_THE_FRONT, tmp_path / name) for name in ("a.png", "b.png")]
+    pictures = [
+        draw_coverage([Covered(region, planned, tried)], FROM_THE_FRONT, tmp_path / name) for name in ("a.png", "b.png")
+    ]
     assert pictures[0].read_bytes() == pictures[1].read_bytes()
 
 
@@ -77,7 +79,7 @@ def test_the_same_collection_gives_the_same_picture(tmp_path: Path, region: Regi
 def test_few_and_many_starts_all_show(tmp_path: Path, region: Region, count: int) -> None:
     planned = plan_starts(region, count)
     tried = [Tried(start.xy, "failed", start.xy) for start in planned]
-    picture = draw_coverage(region, planned, tried, FROM_THE_FRONT, tmp_path / "coverage.png")
+    picture = draw_coverage([Covered(region, planned, tried)], FROM_THE_FRONT, tmp_path / "coverage.png")
     chart = chart_of(region, FROM_THE_FRONT)
     with Image.open(picture) as image:
         pixels = np.asarray(image).astype(int)

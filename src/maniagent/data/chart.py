@@ -22,7 +22,11 @@ _LEFT, _TOP, _RIGHT, _BOTTOM = 74, 66, 300, 66
 """px around the table: axis, title, legend, axis."""
 _TICK = 0.1
 """m between the lines across the table."""
-_PAPER, _INK, _FAINT, _LINE = (255, 255, 255), (38, 43, 51), (108, 116, 126), (205, 211, 218)
+INK: Colour = (38, 43, 51)
+_PAPER, _FAINT, _LINE = (255, 255, 255), (108, 116, 126), (205, 211, 218)
+
+_BARS = 24
+_BAR: Colour = (112, 150, 192)
 
 Mark = Callable[["Chart", FloatArray], None]
 """Draws something at a place (2,) px."""
@@ -93,18 +97,18 @@ class Chart:
         """A straight line between places (2,) px."""
         self._draw.line([*(start * _FINE).tolist(), *(end * _FINE).tolist()], colour, round(width * _FINE))
 
-    def text(self, place: FloatArray, words: str, size: float, colour: Colour = _INK, anchor: str = "lm") -> None:
+    def text(self, place: FloatArray, words: str, size: float, colour: Colour = INK, anchor: str = "lm") -> None:
         """Words at a place (2,) px; `anchor` as Pillow has it."""
         font = ImageFont.load_default(size * _FINE)
         self._draw.text(tuple((place * _FINE).tolist()), words, fill=colour, font=font, anchor=anchor)
 
     def axes(self) -> None:
-        """Lines across the table every ten centimetres, with the base frame's coordinates where those run along."""
+        """Lines across the table every 10 cm, with the base frame's coordinates (cm) where those run along."""
         width, height = self.size
         for axis, direction in enumerate((self._viewpoint.right, self._viewpoint.away)):
             name, sign = _name(direction, ("to the right", "away from the viewer")[axis])
             for tick in np.arange(np.ceil(self._low[axis] / _TICK), np.floor(self._high[axis] / _TICK) + 1) * _TICK:
-                label = f"{sign * tick + 0.0:.1f}".replace("-0.0", "0.0")
+                label = f"{round(100 * sign * tick) + 0:d}"
                 if axis == 0:
                     u = _LEFT + (tick - self._low[0]) * SCALE
                     self.line(np.array([u, _TOP]), np.array([u, height - _BOTTOM]), _LINE)
@@ -115,22 +119,53 @@ class Chart:
                     self.text(np.array([_LEFT - 10, v]), label, 13, _FAINT, "rm")
             if axis == 0:
                 middle = (_LEFT + width - _RIGHT) / 2
-                self.text(np.array([middle, height - 22]), name, 14, _INK, "mm")
+                self.text(np.array([middle, height - 22]), name, 14, INK, "mm")
             else:
-                self.text(np.array([12, _TOP - 16]), name, 14, _INK)
+                self.text(np.array([12, _TOP - 16]), name, 14, INK)
 
     def title(self, words: str) -> None:
         """Words above the table."""
         self.text(np.array([_LEFT, 24]), words, 20)
 
-    def legend(self, entries: Sequence[Entry]) -> None:
-        """What the marks mean, beside the table."""
+    def view_direction(self) -> None:
+        """An arrow below the table, the way that the person looks who sees the main view."""
+        tip = np.array([self.size[0] - _RIGHT - 16.0, self.size[1] - _BOTTOM + 30.0])
+        self.line(tip + np.array([0, 26]), tip, INK, 2)
+        self.polygon(tip + np.array([(-6, 4), (6, 4), (0, -8)]), INK)
+        self.text(tip + np.array([-14, 14]), "camera looks this way", 14, INK, "rm")
+
+    def legend(self, entries: Sequence[Entry]) -> float:
+        """What the marks mean, beside the table; where that ends, px from the top."""
         u, v = self.size[0] - _RIGHT + 30, _TOP + 14
         for number, entry in enumerate(entries):
             place = np.array([u, v + 34 * number])
             if entry.mark is not None:
                 entry.mark(self, place)
             self.text(place + np.array([24 if entry.mark else -8, 0]), entry.text, 15)
+        return float(v + 34 * len(entries))
+
+    def histogram(self, top: float, values: FloatArray, threshold: float, title: str) -> None:
+        """How often each value (N,) comes, beside the table from `top` px on, with a line at the threshold.
+
+        Values beyond twice the threshold are counted in the last bar.
+        """
+        low, high = np.array([self.size[0] - _RIGHT + 22.0, self.size[1] - _BOTTOM]), self.size[0] - 24.0
+        tall = min(150.0, low[1] - top - 70.0)
+        counts, _ = np.histogram(np.minimum(values, 2 * threshold * (1 - 1e-9)), bins=_BARS, range=(0, 2 * threshold))
+        wide = (high - low[0]) / _BARS
+        self.text(low - np.array([0, tall + 40]), title, 14)
+        for number, count in enumerate(counts):
+            left, height = low[0] + number * wide, tall * count / max(counts.max(), 1)
+            box = np.array([(left, low[1]), (left, low[1] - height), (left + wide - 1, low[1] - height)])
+            if count:
+                self.polygon(np.vstack([box, (left + wide - 1, low[1])]), _BAR)
+        self.line(low, np.array([high, low[1]]), _FAINT)
+        middle = (low[0] + high) / 2
+        self.line(np.array([middle, low[1]]), np.array([middle, low[1] - tall - 6]), INK, 1.5)
+        self.text(np.array([middle, low[1] - tall - 16]), "threshold", 13, _FAINT, "mm")
+        for share, more in ((0.0, ""), (1.0, ""), (2.0, "+")):
+            place = np.array([low[0] + share * (middle - low[0]), low[1] + 14])
+            self.text(place, f"{share * threshold:g}{more}", 13, _FAINT, "mm")
 
     def finished(self) -> Image.Image:
         """The picture."""
@@ -141,5 +176,5 @@ def _name(direction: FloatArray, otherwise: str) -> tuple[str, int]:
     """The name of an axis of the picture, and the sign with which its coordinate counts."""
     axis = int(np.abs(direction).argmax())
     if abs(direction[axis]) < np.cos(np.radians(1.0)):
-        return f"{otherwise}, m from the robot's base", 1
-    return f"{'xy'[axis]}, m", int(np.sign(direction[axis]))
+        return f"{otherwise}, cm from the robot's base", 1
+    return f"{'xy'[axis]}, cm", int(np.sign(direction[axis]))

@@ -10,7 +10,7 @@ from typing import Protocol, Self
 from ..envs.cameras import MAIN_CAMERA
 from ..perception.viewpoint import Viewpoint
 from .cluster import RayCluster
-from .coverage import Tried, draw_coverage
+from .coverage import Covered, Tried, draw_coverage
 from .crew import Crew
 from .disk import disk_errors_told, write_whole
 from .episode import EpisodeInfo
@@ -31,6 +31,8 @@ BATCH = 25
 """Episodes that go into the dataset at a time."""
 MOST_WAITING = 8
 """Batches that may wait for the dataset before workers have to; at the defaults an episode takes 65 MB until then."""
+MAP = "coverage.png"
+_PICTURE = f"\n## Where episodes began\n\n![Starts on the table, seen from above]({MAP})\n"
 _LOCK = ".collect.lock"
 _PATIENCE = 0.5
 """s between looks at what the writer does."""
@@ -114,22 +116,28 @@ def _check(settings: CollectSettings, folder: Path, writer: Writer | None) -> No
 
 
 def write_summary(settings: CollectSettings, folder: Path) -> Summary:
-    """Figures and maps of what there is."""
+    """Figures and a map of what there is."""
     attempts = read_attempts(folder)
     summary = summarise(settings.task, settings.count, attempts, read_costs(folder))
     write_whole(folder / "summary.json", summary.model_dump_json(indent=2) + "\n")
-    write_whole(folder / "summary.md", to_markdown(summary))
-    viewpoint = Viewpoint.from_camera(MAIN_CAMERA.T_base_camera)
-    for worker in range(settings.workers):
-        mine = [info for info in attempts if parts_of(info.key)[0] == worker]
-        table = Table.load(folder, worker)
-        if mine and table is not None:
-            planned = {info.start: Start(parts_of(info.key)[1], info.start[:2], info.start[2]) for info in mine}
-            tried = [Tried.of(info, info.began) for info in mine]
-            picture = folder / f"coverage-w{worker:02d}.png"
-            with disk_errors_told(picture):
-                draw_coverage(table.region(settings), list(planned.values()), tried, viewpoint, picture)
+    covered = [_covered(settings, folder, worker, attempts) for worker in range(settings.workers)]
+    tables = [table for table in covered if table is not None]
+    write_whole(folder / "summary.md", to_markdown(summary) + _PICTURE * bool(tables))
+    if tables:
+        viewpoint = Viewpoint.from_camera(MAIN_CAMERA.T_base_camera)
+        with disk_errors_told(folder / MAP):
+            draw_coverage(tables, viewpoint, folder / MAP, settings.threshold)
     return summary
+
+
+def _covered(settings: CollectSettings, folder: Path, worker: int, attempts: Sequence[EpisodeInfo]) -> Covered | None:
+    """What has come of one worker's starts; None where it has tried none."""
+    mine = [info for info in attempts if parts_of(info.key)[0] == worker]
+    table = Table.load(folder, worker)
+    if not mine or table is None:
+        return None
+    planned = {info.start: Start(parts_of(info.key)[1], info.start[:2], info.start[2]) for info in mine}
+    return Covered(table.region(settings), list(planned.values()), [Tried.of(info) for info in mine])
 
 
 class _Publisher:
