@@ -85,7 +85,7 @@ def collect(
 
     No model is asked: sequences come from the rules, the cache, or a run that a model once made, and are bound to every
     scene. An episode is valid when a look finds the object where it was to be. The folder holds a LeRobotDataset v3 in
-    dataset/, summary.md, maps of where episodes started, and what is doubtful in episodes/quarantine. Stopped or
+    dataset/, summary.md, a map of where episodes started, and what is doubtful in episodes/quarantine. Stopped or
     killed, the same command goes on; with a larger -n it collects more.
 
     [bold]Examples[/]
