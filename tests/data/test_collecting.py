@@ -23,7 +23,7 @@ from maniagent.data.lerobot.publish import STAGED
 from maniagent.data.moves import move_to, moves_of
 from maniagent.data.outcome import Outcomes, release_point
 from maniagent.data.sessions import Costs
-from maniagent.data.settings import CollectSettings, checked_settings
+from maniagent.data.settings import CollectSettings, checked_settings, resumed_settings
 from maniagent.data.summary import summarise, to_markdown
 from maniagent.errors import ManiAgentError, UsageError
 from maniagent.geometry import rotation_z
@@ -118,6 +118,16 @@ def test_the_same_settings_go_on_and_may_want_more_and_others_are_refused(tmp_pa
     assert CollectSettings.load(tmp_path).count == 9
     with pytest.raises(UsageError, match="seed 0, not 1"):
         settings(seed=1).save(tmp_path)
+
+
+def test_a_collection_is_resumed_as_it_was_begun(tmp_path: Path) -> None:
+    with pytest.raises(UsageError, match="is no collection"):
+        resumed_settings(tmp_path, "carrot-on-plate")
+    settings(seed=7).save(tmp_path)
+    assert resumed_settings(tmp_path, "carrot-on-plate") == settings(seed=7)
+    assert resumed_settings(tmp_path, "carrot-on-plate", 9) == settings(seed=7, count=9)
+    with pytest.raises(UsageError, match="a collection of carrot-on-plate, not of spoon-on-towel"):
+        resumed_settings(tmp_path, "spoon-on-towel")
 
 
 def test_a_folder_with_something_else_is_left_alone(tmp_path: Path) -> None:

@@ -17,8 +17,14 @@ if TYPE_CHECKING:
 
 def collect(
     task: Annotated[str, typer.Argument(help="A task (`maniagent tasks` lists them), or a scene file.")],
-    count: Annotated[int, typer.Option("-n", "--count", min=1, help="Valid episodes wanted.")] = 100,
+    count: Annotated[
+        int | None, typer.Option("-n", "--count", min=1, help="Valid episodes wanted.", show_default="100")
+    ] = None,
     out: Annotated[Path, typer.Option(help="Folder of the collection.")] = Path("runs/collection"),
+    resume: Annotated[
+        bool,
+        typer.Option("--resume", help="Go on with what is in the folder, as it was begun; only -n, if given, changes."),
+    ] = False,
     workers: Annotated[int, typer.Option(min=1, max=256, help="Processes, each with a table of its own.")] = 1,
     seed: Annotated[int, typer.Option(min=0, help="Fixes layouts, starts and the cameras' noise.")] = 0,
     do: Annotated[
@@ -92,6 +98,8 @@ def collect(
 
       maniagent collect carrot-on-plate -n 300 --workers 2 --out carrots
 
+      maniagent collect carrot-on-plate -n 500 --out carrots --resume
+
       maniagent collect hungry --do "put the banana on the plate" -n 50 --say "I would like to eat something"
 
       maniagent collect menemen --from runs/menemen --call "brown egg=egg" -n 50
@@ -104,29 +112,32 @@ def collect(
         from ..data.helping import helper_for
         from ..data.lerobot import Writer
         from ..data.progress import CollectProgress
-        from ..data.settings import checked_settings, phrases_in, read_calls
+        from ..data.settings import checked_settings, phrases_in, read_calls, resumed_settings
         from ..robots.sampling import Sampling
 
-        settings = checked_settings(
-            task,
-            do,
-            cache,
-            run=run,
-            called=read_calls(call or ()),
-            count=count,
-            seed=seed,
-            workers=workers,
-            paraphrases=(*(say or ()), *(phrases_in(say_file) if say_file is not None else ())),
-            texts=texts,
-            pattern=pattern,
-            yaw=None if yaw is None else math.radians(yaw),
-            x=x,
-            y=y,
-            reset=reset,
-            threshold=threshold,
-            attempts=attempts,
-            sampling=Sampling(rate=fps, width=width, height=height, depth=depth),
-        )
+        if resume:
+            settings = resumed_settings(out, task, count)
+        else:
+            settings = checked_settings(
+                task,
+                do,
+                cache,
+                run=run,
+                called=read_calls(call or ()),
+                count=count or 100,
+                seed=seed,
+                workers=workers,
+                paraphrases=(*(say or ()), *(phrases_in(say_file) if say_file is not None else ())),
+                texts=texts,
+                pattern=pattern,
+                yaw=None if yaw is None else math.radians(yaw),
+                x=x,
+                y=y,
+                reset=reset,
+                threshold=threshold,
+                attempts=attempts,
+                sampling=Sampling(rate=fps, width=width, height=height, depth=depth),
+            )
         with (
             nullcontext() if stage_only else Writer(lerobot_python) as writer,
             CollectProgress() as progress,

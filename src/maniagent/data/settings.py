@@ -144,6 +144,17 @@ def checked_settings(
         raise UsageError(describe_validation(error)) from error
 
 
+def resumed_settings(folder: Path, task: str, count: int | None = None) -> CollectSettings:
+    """The settings with which the collection in a folder was begun; `count`, where given, is the new one.
+
+    Raises UsageError where there is none, or it is one of another task.
+    """
+    there = CollectSettings.load(folder)
+    if there.task != task:
+        raise UsageError(f"{folder} is a collection of {there.task}, not of {task}.")
+    return there if count is None else there.model_copy(update={"count": count})
+
+
 def _plain_moves(instruction: str, cache: Path | None) -> tuple[Move, ...]:
     store = ActionCache(CacheStore(cache, must_exist=True)) if cache is not None else None
     try:
