@@ -96,6 +96,13 @@ def _check_videos(data: Any, length: int, folder: Path) -> None:
             raise RuntimeError(f"{folder}: {key} has {seconds * data.fps:.1f} frames on video, not {length}")
 
 
+def mend() -> None:
+    """Have lerobot, which is imported, write quickly and rightly."""
+    _encode_quickly()
+    _count_bytes()
+    gc.freeze()  # what a hundred packages made when imported needn't be looked through again: a third of the work
+
+
 def _encode_quickly() -> None:
     """Have lerobot encode h264 with x264's fastest preset, which lerobot can't be told.
 
@@ -256,9 +263,7 @@ def main() -> None:
         answers.write(json.dumps(what) + "\n")
         answers.flush()
 
-    _count_bytes()
-    _encode_quickly()
-    gc.freeze()  # what a hundred packages made when imported needn't be looked through again: a third of the work
+    mend()
     say({"ok": {"lerobot": lerobot.__version__}})
     requests: queue.SimpleQueue[str] = queue.SimpleQueue()
     threading.Thread(target=_read_requests, args=(requests,), daemon=True).start()

@@ -1,6 +1,6 @@
 """Does a collection survive being killed? The whole command is killed at random moments, and goes on each time.
 
-    python benchmarks/collecting_killed.py --kills 20 -n 24 --workers 2 --out DIR --lerobot-python PYTHON
+    python benchmarks/endurance/collecting_killed.py --kills 20 -n 24 --workers 2 --out DIR --lerobot-python PYTHON
 
 Each round starts `maniagent collect` as it left off and kills its whole process group (workers and the dataset's writer
 too) with SIGKILL at a moment drawn uniformly from [0, --seconds]: in its start, while it collects, while it publishes.
