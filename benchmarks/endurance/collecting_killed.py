@@ -149,7 +149,7 @@ class Trial:
 
     def round(self, number: int, seconds: float | None) -> Round:
         """Start the command, kill it after so many seconds (None: let it finish), and look what is there."""
-        attempts = self._attempts()
+        attempts, left = self._attempts(), self._generations()
         began = time.monotonic()
         process = subprocess.Popen(  # noqa: S603 - our own command
             self._command(), stdout=self._log, stderr=self._log, start_new_session=True
@@ -158,7 +158,7 @@ class Trial:
             self.watch.look()
             time.sleep(LOOKS)
         finished = process.poll() is not None
-        publishing = any(self.collection.glob(".dataset.next/*"))
+        publishing = bool(self._generations() - left)
         if not finished:
             os.killpg(process.pid, signal.SIGKILL)
         status = process.wait()
@@ -170,6 +170,10 @@ class Trial:
             done.problems.append(f"processes are left {GONE:g} s later")
         self._examine(done)
         return done
+
+    def _generations(self) -> set[Path]:
+        """Copies of the dataset that are being made, or that a kill left behind."""
+        return set(self.collection.glob(".dataset.next/*"))
 
     def want_more(self) -> None:
         """The collection is complete; let there be something to kill."""
