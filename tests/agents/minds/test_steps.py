@@ -113,11 +113,22 @@ def test_steps_that_mean_nothing_are_sent_back_with_their_number(steps: list[dic
 def test_the_schema_offers_no_step_that_can_not_be_meant() -> None:
     kinds = Written.model_json_schema()["$defs"]["WrittenStep"]["anyOf"]
     own, other, point, here = (kind["properties"] for kind in kinds)
-    assert "grasp" in own["to"]["enum"]
-    assert own["object"]["const"] == 0
+    assert (own["to"]["const"], own["object"]["const"]) == ("grasp", 0)
     assert "grasp" not in other["to"]["enum"]
-    assert other["object"]["minimum"] == 1
+    assert other["gripper"]["enum"] == ["open", "keep"], "things are taken at the grasp"
     assert {"x", "y"} <= set(kinds[2]["required"])
     assert not {"x", "y", "object"} & set(here)
     assert list(own)[:3] == list(other)[:3] == ["do", "object", "to"], "what follows from something comes after it"
     assert set().union(own, other, point, here) == set(WrittenStep.model_fields)
+
+
+def test_fingers_that_open_too_early_and_once_more_where_it_belongs_are_meant_to_keep() -> None:
+    over = {"do": "over", "to": "surface", "object": 1, "up": 0.1}
+    lower = {"do": "lower", "to": "surface", "object": 1, "up": 0.006, "gripper": "open"}
+    leave = {"do": "leave", "to": "here", "up": 0.1, "gripper": "open"}
+    hasty = keypoints(*TAKE[:2], TAKE[2] | {"gripper": "open"}, over | {"gripper": "open"}, lower, leave)
+    meant = keypoints(*TAKE, over, lower, leave)
+    assert [p.gripper for p in hasty] == [p.gripper for p in meant]
+    assert [p.held for p in hasty] == [p.held for p in meant] == [None, None, 0, 0, 0, None]
+    with pytest.raises(Unfit, match="drops the object"):
+        keypoints(*TAKE, over | {"gripper": "open"}, {"do": "close", "to": "here", "gripper": "close"}, lower)

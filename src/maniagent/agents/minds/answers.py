@@ -88,38 +88,42 @@ class Choice(Answer):
 def _only_what_makes_sense(schema: dict[str, Any]) -> None:
     """Offer the kinds of steps apart, so that a schema that is enforced lets no step be written that can't be meant.
 
-    Only object 0 can be grasped; a point has coordinates and no object. The object comes before its place, as that
-    follows from it.
+    Only object 0 can be grasped, and objects are taken at the grasp alone; a point has coordinates and no object. The
+    object comes before its place, as that follows from it.
     """
     _untitled(schema)
-    fields = schema.pop("properties")
+    fields = schema["properties"]
     for field in fields.values():
         field.pop("default", None)
-    needed = schema.pop("required")
-    do, held, x, y = (fields.pop(name) for name in ("do", "object", "x", "y"))
+    do, index, x, y, lie, end, gripper = (
+        fields.pop(name) for name in ("do", "object", "x", "y", "lie", "end", "gripper")
+    )
     del fields["to"]
-    index, number = held["anyOf"][0], x["anyOf"][0]
-    of_object = {"type": "string", "enum": list(get_args(OfObject))}
-    at_own = {"type": "string", "enum": ["grasp", *get_args(OfObject)]}
-    in_place = {name: field for name, field in fields.items() if name not in ("lie", "end")}
+    index, x, y = (optional["anyOf"][0] for optional in (index, x, y))
+    place = {"type": "string", "enum": list(get_args(OfObject))}
+    release = {**gripper, "enum": ["open", "keep"]}
 
-    def kind(more: dict[str, Any], needs: tuple[str, ...] = (), **own: Any) -> dict[str, Any]:
-        properties = {"do": do, **own, **more}
+    def kind(gripper: dict[str, Any], **own: Any) -> dict[str, Any]:
+        properties = {"do": do, **own, **fields, "gripper": gripper}
         return {
             "type": "object",
             "properties": properties,
-            "required": [*needed, *needs],
+            "required": [name for name in properties if name in ("do", "object", "to", "x", "y")],
             "additionalProperties": False,
         }
 
-    schema.pop("type")
-    schema.pop("additionalProperties")
+    for name in ("type", "properties", "required", "additionalProperties"):
+        schema.pop(name)
     schema["anyOf"] = [
-        kind(fields, ("object",), object={"type": "integer", "const": 0}, to=at_own),
-        kind(fields, ("object",), object={**index, "minimum": 1}, to=of_object),
-        kind(fields, ("x", "y"), to={"type": "string", "const": "point"}, x=number, y=y["anyOf"][0]),
-        kind(in_place, to={"type": "string", "const": "here"}),
+        kind(gripper, object={"type": "integer", "const": 0}, to=_only("grasp")),
+        kind(release, object=index, to=place, lie=lie, end=end),
+        kind(gripper, to=_only("point"), x=x, y=y, lie=lie, end=end),
+        kind(gripper, to=_only("here")),
     ]
+
+
+def _only(word: str) -> dict[str, Any]:
+    return {"type": "string", "const": word}
 
 
 class WrittenStep(Answer):

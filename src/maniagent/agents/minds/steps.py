@@ -6,7 +6,7 @@ What a model gets wrong easily is worked out here: which object is in the grippe
 from __future__ import annotations
 
 import math
-from collections.abc import Mapping
+from collections.abc import Mapping, Sequence
 
 from ...models.question import Unfit
 from ...types import (
@@ -36,14 +36,27 @@ def to_sequence(written: Written) -> ActionSequence:
         where = f"Step {number} ({step.do})"
         if step.to == "grasp" and step.gripper == "close" and not opened:
             raise Unfit(f"{where} closes the fingers on the grasp, but no step before opens them above it.")
-        if held is not None and step.gripper == "open" and step.up > HIGHEST_DROP and step.to != "here":
-            raise Unfit(f"{where} drops the object from {step.up:.2f} m. Lower it first.")
+        if held is not None and step.gripper == "open" and step.up > HIGHEST_DROP:
+            if _lets_go(written.steps[number:]):  # once more and lower: it wasn't meant to fall
+                step = step.model_copy(update={"gripper": "keep"})
+            elif step.to != "here":
+                raise Unfit(f"{where} drops the object from {step.up:.2f} m. Lower it first.")
         steps.append(_to_step(step, held, where, first=number == 1))
         if step.gripper == "open":
             held, opened = None, True
         elif step.gripper == "close" and step.to == "grasp" and held is None:
             held = step.object
     return ActionSequence(skill=written.skill, steps=tuple(steps))
+
+
+def _lets_go(steps: Sequence[WrittenStep]) -> bool:
+    """Whether the fingers open low above a place in one of these steps, before any in which they close."""
+    for step in steps:
+        if step.gripper == "close":
+            return False
+        if step.gripper == "open" and step.to != "here" and step.up <= HIGHEST_DROP:
+            return True
+    return False
 
 
 def _to_step(step: WrittenStep, held: int | None, where: str, *, first: bool) -> ActionStep:
