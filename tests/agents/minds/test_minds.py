@@ -443,6 +443,7 @@ def steps(*kept: int, **changed: Any) -> Json:
         (steps(0, do=""), "at least 1"),
         (steps(0, to="moon"), "Input should be"),
         ({"skill": "x", "steps": [PUT["steps"][0]] * 17}, "at most 12"),
+        (steps(0, 2) | {"skill": "pick-and-place"}, "No step takes object 0"),
     ],
 )
 def test_movements_that_can_not_be_made_are_sent_back_and_mended(answer: Json, said: str) -> None:

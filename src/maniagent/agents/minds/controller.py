@@ -15,6 +15,9 @@ from .prompts import Prompt
 from .steps import to_sequence
 from .telling import fenced, one_line, tell_frame, tell_objects
 
+TAKING = ("pick-and-place", "drag", "rotate")
+"""Skills that hold the object; one of a model's own may push it."""
+
 
 class MindControllerAgent:
     """Asks a language model, and takes nothing that doesn't bind to the objects at hand."""
@@ -62,6 +65,8 @@ def _check(written: Written, objects: Sequence[ObjectInfo], viewpoint: Viewpoint
                 f"Step {number} ({step.do}) goes to the grasp of object {step.object}; only object 0 can be grasped. "
                 'To put something onto another object, use "to":"surface".'
             )
+    if written.skill in TAKING and not any(step.to == "grasp" and step.gripper == "close" for step in written.steps):
+        raise Unfit(f'No step takes object 0: {written.skill} needs one with "to":"grasp" and "gripper":"close".')
     sequence = to_sequence(written)
     try:
         keypoints = bind(sequence, objects, viewpoint)
