@@ -5,6 +5,7 @@ from __future__ import annotations
 import contextlib
 import os
 import resource
+import signal
 import subprocess
 import sys
 import time
@@ -47,10 +48,14 @@ def made(folder: Path, count: int = 2) -> Path:
 
 def started(*said: str) -> subprocess.Popen[str]:
     """The command, in a process group of its own."""
-    return subprocess.Popen(
-        [sys.executable, "-m", "maniagent.cli", *said],
-        stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
-    )  # fmt: skip
+    before = signal.signal(signal.SIGINT, signal.default_int_handler)  # else a job in the background ignores Ctrl-C
+    try:
+        return subprocess.Popen(
+            [sys.executable, "-m", "maniagent.cli", *said],
+            stdout=subprocess.PIPE, stderr=subprocess.STDOUT, text=True, start_new_session=True,
+        )  # fmt: skip
+    finally:
+        signal.signal(signal.SIGINT, before)
 
 
 def workers_of(process: subprocess.Popen[str]) -> list[int]:
