@@ -4,7 +4,6 @@ from __future__ import annotations
 
 import contextlib
 import errno
-import importlib.util
 import json
 import os
 import subprocess
@@ -16,6 +15,7 @@ from pathlib import Path
 from typing import IO, Any
 
 from ...errors import ManiAgentError, SetupError
+from ..interpreter import interpreter_with
 
 VARIABLE = "MANIAGENT_TFDS_PYTHON"
 SCRIPT = Path(__file__).with_name("writer.py")
@@ -33,21 +33,8 @@ class WriterFailure(ManiAgentError):
 
 
 def find_interpreter(named: Path | None = None) -> Path:
-    """The interpreter that has tensorflow_datasets: the one named, else that in MANIAGENT_TFDS_PYTHON, else this one.
-
-    Raises SetupError where the named one isn't there, or where none is named and it isn't installed here. Whether
-    another one really has it shows when the writer starts.
-    """
-    from_variable = os.environ.get(VARIABLE)
-    if named is None and from_variable:
-        named = Path(from_variable)
-    if named is not None:
-        if not (named.is_file() and os.access(named, os.X_OK)):
-            raise SetupError(f"{named} is no Python interpreter; name one that has tensorflow_datasets. {HOW}")
-        return named.absolute()  # not resolved: a virtual environment's python is a link, and means what it is called
-    if importlib.util.find_spec("tensorflow_datasets") is None or importlib.util.find_spec("tensorflow") is None:
-        raise SetupError(f"RLDS datasets are written with tensorflow_datasets, which isn't installed here. {HOW}")
-    return Path(sys.executable)
+    """The interpreter named, else that in MANIAGENT_TFDS_PYTHON, else this one. Raises as `interpreter_with`."""
+    return interpreter_with(("tensorflow_datasets", "tensorflow"), named, VARIABLE, HOW)
 
 
 def write(
